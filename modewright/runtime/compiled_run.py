@@ -37,7 +37,9 @@ def run_simulation(
 ) -> tuple[Trajectory, str]:
     """Return the trajectory of a run and the name of the back end, with the reason if not compiled.
 
-    `compiled` uses C if possible; None uses C for long runs only.
+    `compiled` uses C if possible and False the interpreter; None uses C from COMPILE_THRESHOLD
+    steps on. Without a compiler, after a failed build and for a run that stops in C the interpreter
+    runs it. The name is `compiled`, `compiled, block by block: reason` or `interpreter: reason`.
     """
     scenario = resolve_recording(system, scenario)
     programs = programs_of(system, scenario)
@@ -57,8 +59,8 @@ def run_simulation(
 def run_in_c(system: System, scenario: Scenario) -> tuple[Trajectory, str]:
     """Return the trajectory of a run in compiled C, and how it was run.
 
-    A run that cannot be planned as a whole, or that stops, runs block by block. Raises
-    MissingToolError and BuildError.
+    The text is `compiled`, or `compiled, block by block: reason` for a run that cannot be planned
+    as a whole or that stops. Raises MissingToolError and BuildError.
     """
     scenario = resolve_recording(system, scenario)
     programs = programs_of(system, scenario)
@@ -72,7 +74,11 @@ def run_in_c(system: System, scenario: Scenario) -> tuple[Trajectory, str]:
 def simulate_resolved(
     system: System, scenario: Scenario, programs: Mapping[str, Program]
 ) -> Trajectory:
-    """Return the trajectory of a resolved scenario, in C if possible."""
+    """Return the trajectory of a scenario whose recording was resolved, in C if possible.
+
+    `programs` are the Programs of the instances. Without a compiler, after a failed build and for a
+    run that stops in C the interpreter runs it; the result has the same bits.
+    """
     with suppress(MissingToolError, BuildError, OSError):
         trajectory, _ = _simulate_in_c(system, scenario, programs)
         if trajectory:
@@ -97,15 +103,20 @@ def _simulate_in_c(
 
 
 def run_batch(batch: Batch, threads: int | None = None, min_steps: int = 0) -> BatchResult:
-    """Return the results of a batch, in C on all cores or on a number of threads.
+    """Return the results of a batch, in C on `threads` threads (None: all cores).
 
-    Batches with fewer than `min_steps` steps in total are not compiled.
+    Batches with fewer than `min_steps` steps in total are interpreted, as are those that cannot be
+    compiled; then `note` of the result has the reason.
     """
     return _run_planned(CompiledBatchCache(load_library, min_steps), batch, threads)
 
 
 def run_block(batch: Batch) -> BatchResult:
-    """Return the results of a part of a study, in C on one core; plans are shared in a process."""
+    """Return the results of a part of a study, in C on one core.
+
+    Compiled plans are shared in a process. Parts with fewer than COMPILE_THRESHOLD steps and those
+    that cannot be compiled are interpreted.
+    """
     return _run_planned(_shared_planner(), batch, threads=1)
 
 

@@ -11,7 +11,10 @@ GENERATION_0_THRESHOLD = 1_000_000
 
 
 def raise_gc_threshold() -> None:
-    """Raise the threshold of the collector; do nothing if it is disabled."""
+    """Raise the threshold of generation 0 to GENERATION_0_THRESHOLD, unless it is larger.
+
+    Does nothing if the collector is disabled by a threshold of 0.
+    """
     young, *older = gc.get_threshold()
     if young:
         gc.set_threshold(max(young, GENERATION_0_THRESHOLD), *older)
@@ -19,7 +22,10 @@ def raise_gc_threshold() -> None:
 
 @contextmanager
 def infrequent_gc() -> Iterator[None]:
-    """Raise the threshold of the collector in the context; it took 4 % of a diagnosis."""
+    """Raise the threshold as `raise_gc_threshold` in the context and restore it at the end.
+
+    The collector took 4 % of a diagnosis.
+    """
     before = gc.get_threshold()
     raise_gc_threshold()
     try:

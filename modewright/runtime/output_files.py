@@ -23,7 +23,10 @@ class OutputError(Exception):
 
 
 def make_folder(folder: Path) -> None:
-    """Create a folder and its parents. Raises OutputError."""
+    """Create a folder and its missing parents; an existing folder is accepted.
+
+    Raises OutputError if the path is a file or a broken link, or cannot be created.
+    """
     if folder.is_symlink() and not folder.exists():
         raise OutputError(f"{folder}: this is a link to what is not there")
     if folder.exists() and not folder.is_dir():
@@ -35,9 +38,11 @@ def make_folder(folder: Path) -> None:
 
 
 def require_writable(*paths: Path | None) -> None:
-    """Raise OutputError for paths that are specs, results of a study, or not writable.
+    """Raise OutputError for the first path that must not or cannot be written.
 
-    Commands call this before the computation; None is skipped.
+    These are existing files with one of SPEC_SUFFIXES, parts of a store of results (RESULT_NAMES),
+    and paths that `require_writable_location` rejects. None is skipped. Commands call this before
+    the computation.
     """
     for path in paths:
         if path is None:
@@ -57,9 +62,10 @@ def _is_result(place: Path) -> bool:
 
 
 def require_separate_outputs(results: Path, *paths: Path | None) -> None:
-    """Raise OutputError for outputs that are equal or part of the folder `results` of a study.
+    """Raise OutputError if two outputs are one file or an output is a part of a study's results.
 
-    The folder need not exist yet; outputs may be in it.
+    Parts are STUDY_FOLDER_NAMES in the folder `results`; other outputs may be in it, even if it
+    does not exist yet. All must also pass `require_writable`. None is skipped.
     """
     folder, claimed = results.resolve(), set[Path]()
     for path in paths:
@@ -76,14 +82,22 @@ def require_separate_outputs(results: Path, *paths: Path | None) -> None:
 
 
 def require_calibration_output(path: Path) -> None:
-    """Raise OutputError for a path that is another kind of spec or not writable."""
+    """Raise OutputError for an existing file that is no calibration, or an unwritable path.
+
+    A calibration has a line that starts with `calibration:`.
+    """
     require_writable_location(path)
     if path.is_file() and not any(line.startswith(b"calibration:") for line in path.open("rb")):
         raise OutputError(f"{path}: this is no calibration; a new one would replace it")
 
 
 def require_writable_location(path: Path) -> None:
-    """Raise OutputError for a path that cannot be written."""
+    """Raise OutputError for a path at which no file can be written.
+
+    This is a folder, a socket or block device, and a path whose folder is missing or not writable;
+    a pipe or character device is accepted if it is writable. For a link the folder of its target
+    counts. Nothing is created.
+    """
     if path.is_dir():
         raise OutputError(f"{path}: this is a folder; name a file in it")
     if path.exists() and not path.is_file() and not _is_stream(path):
@@ -97,9 +111,11 @@ def require_writable_location(path: Path) -> None:
 
 
 def write_files(files: Mapping[Path, bytes]) -> None:
-    """Write all files, or none if one cannot be written. Raises OutputError.
+    """Write all files atomically: none is replaced before all are written beside their targets.
 
-    Existing files keep their mode and links their target; pipes are written last.
+    Existing files keep their mode, new ones have DEFAULT_FILE_MODE; a link keeps its target, which
+    is replaced. Pipes and character devices are written last. Raises OutputError; then no temporary
+    file is left over.
     """
     temporary_files: list[tuple[str, Path]] = []
     current = Path()
@@ -146,7 +162,10 @@ def _is_stream(path: Path) -> bool:
 
 
 def remove_files(paths: Iterable[Path]) -> None:
-    """Remove files; missing ones are ignored. Raises OutputError."""
+    """Remove files in the given order; missing ones are ignored.
+
+    Raises OutputError at the first one that cannot be removed.
+    """
     for path in paths:
         try:
             path.unlink(missing_ok=True)
