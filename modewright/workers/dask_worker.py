@@ -16,7 +16,11 @@ if TYPE_CHECKING:
 def compute_block(
     expected_fingerprint: Mapping[str, str], serialised_study: bytes, start: int, stop: int
 ) -> Answer:
-    """Return the answer of this worker for the variants from `start` to `stop` (exclusive)."""
+    """Return the answer of this worker for the variants from `start` to `stop` (exclusive).
+
+    The answer is a refusal if the worker's own fingerprint is not `expected_fingerprint` or its
+    Programs differ; else it contains the results or the error.
+    """
     from modewright.runtime.compiled_run import run_block
     from sweep.execution.dask_worker import answer_block
     from sweep.store.row import Block
@@ -25,7 +29,7 @@ def compute_block(
 
 
 def own_fingerprint() -> Mapping[str, str]:
-    """Return the fingerprint of this worker."""
+    """Return the versions and digests of this worker by part; equal ones give equal bits."""
     from sweep.execution.fingerprint import fingerprint
 
     return fingerprint()

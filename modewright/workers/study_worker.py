@@ -7,7 +7,7 @@ from sweep.execution.worker import serve_blocks
 
 
 def main() -> None:
-    """Answer blocks until the parent process is gone."""
+    """Read a study and blocks from stdin and answer them on stdout until the input ends."""
     serve_blocks(run_block)
 
 
