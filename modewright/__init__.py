@@ -138,7 +138,11 @@ PLACES = {
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public name at its first use. Raises AttributeError for other names."""
+    """Import a public name (one in `__all__`) at its first use and store it in this module.
+
+    The module of the name is in PLACES, else `modewright.api.simulation`. Raises AttributeError for
+    other names.
+    """
     if name not in __all__:
         raise AttributeError(f"module `modewright` has no `{name}`")
     value = getattr(import_module(PLACES.get(name, "modewright.api.simulation")), name)
