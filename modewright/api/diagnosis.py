@@ -106,11 +106,11 @@ def diagnose(
 ) -> DiagnosisReport:
     """Find the effects that an automaton lacks to reproduce recordings.
 
-    `train` are the recordings to explain, `held_out` those for the validation only; a file in both
-    raises ValueError. `map` is the map of recordings (default: that of the spec). `effects` is a
-    folder of effects instead of those of the project and of the library. `thresholds` are `kept`
-    (of an earlier bootstrap, else the defaults), `bootstrap` (computed if there are none), `usual`
-    (the defaults) or a file.
+    `train` are the recordings to explain, `held_out` those for the validation only; a recording
+    that is named twice or in both raises ValueError. `map` is the map of recordings (default: that
+    of the spec). `effects` is a folder of effects instead of those of the project and of the
+    library. `thresholds` are `kept` (of an earlier bootstrap, else the defaults), `bootstrap`
+    (computed if there are none), `usual` (the defaults) or a file.
 
     Recordings with errors are left out, unless `anyway`; if none remains, or after `budget` seconds
     without a verdict, the verdict is `unknown`. With `out` the results are written there as by

@@ -54,9 +54,9 @@ class RegionBox:
 def lift_arrow(arrow: Arrow) -> Arrow:
     """Return the arrow between the enclosing modes of both ends that are in the same region.
 
-    The path of an end is cut one key behind the common prefix of both paths. An end that is inside
-    such a mode is named in a line before the label: `from a.b`, `to a.b` (without the cut path). An
-    arrow within one region does not change.
+    Both paths are cut one key behind the common prefix of the paths to their parents. An end that
+    is inside the mode at the cut is named in a line before the label: `from a.b`, `to a.b` (without
+    the cut path). An arrow within one region does not change.
     """
     depth = 0
     for a, b in zip(arrow.source[:-1], arrow.target[:-1], strict=False):

@@ -133,9 +133,10 @@ def _is_in_column(left: Token, right: Token, starts: set[tuple[int, int]]) -> bo
 def align_values(text: str) -> str:
     """Return a text whose values are aligned where the author aligned some of them.
 
-    This is done in groups of consecutive lines `key: value` of the same level. A group counts as
-    aligned if two of its values start in the same column after more than one blank; the column is
-    moved left or right if a value does not fit. In other groups one blank follows each colon.
+    This is done in groups of consecutive lines `key: value` of the same level. A group is aligned
+    if two of its values start in the same column after more than one blank; longer keys do not
+    count. If all values start in this column it is kept, else they start one blank behind the
+    longest key. In other groups one blank follows each colon.
     """
     tokenised = tokenise(text)
     lines = list(tokenised.lines)

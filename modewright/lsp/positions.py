@@ -49,7 +49,10 @@ def source_text(span: Span) -> str:
 
 
 def path_of(uri: str) -> Path:
-    """Return the resolved path of a file URI with percent escapes decoded; the scheme is ignored."""
+    """Return the resolved path of a file URI.
+
+    Percent escapes are decoded; the scheme is ignored.
+    """
     return Path(unquote(urlparse(uri).path)).resolve()
 
 

@@ -65,7 +65,8 @@ def print_import(screen: Console, imported: ImportedPage) -> None:
 def print_resolved(screen: Console, resolved: ResolvedPage) -> None:
     """Print warnings, the page, remarks and the changed solved numbers, the largest change first.
 
-    At most MAX_SHOWN of each are printed. Added solved numbers are counted only.
+    Of warnings, changes and remarks of each kind at most MAX_SHOWN are printed. Added solved
+    numbers are counted only.
     """
     _print_warnings(screen, resolved.warnings)
     print_page(screen, resolved.page)

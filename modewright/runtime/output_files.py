@@ -113,8 +113,8 @@ def require_writable_location(path: Path) -> None:
 def write_files(files: Mapping[Path, bytes]) -> None:
     """Write all files atomically: none is replaced before all are written beside their targets.
 
-    Existing files keep their mode, new ones have DEFAULT_FILE_MODE; a link keeps its target, which
-    is replaced. Pipes and character devices are written last. Raises OutputError; then no temporary
+    Existing files keep their mode, new ones have DEFAULT_FILE_MODE; for a link its target is
+    replaced. Pipes and character devices are written last. Raises OutputError; then no temporary
     file is left over.
     """
     temporary_files: list[tuple[str, Path]] = []

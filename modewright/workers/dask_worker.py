@@ -18,8 +18,8 @@ def compute_block(
 ) -> Answer:
     """Return the answer of this worker for the variants from `start` to `stop` (exclusive).
 
-    The answer is a refusal if the worker's own fingerprint is not `expected_fingerprint` or its
-    Programs differ; else it contains the results or the error.
+    It is the file of the block, or the reason why there is none. A worker refuses if its own
+    fingerprint is not `expected_fingerprint` or the Programs of the study differ here.
     """
     from modewright.runtime.compiled_run import run_block
     from sweep.execution.dask_worker import answer_block

@@ -38,11 +38,11 @@ def console() -> Console:
 
 
 def configure(quiet: bool = False, verbose: bool = False, log_file: Path | None = None) -> None:
-    """Set the verbosity of console and log.
+    """Set the verbosity of console and log; handlers of an earlier call are removed.
 
-    `quiet` suppresses the output of the console. `verbose` writes the log to stderr, and `log_file`
-    appends it to a file with UTC times, which begins with the command; else only warnings are
-    logged, to nowhere. Handlers of an earlier call are removed.
+    `quiet` suppresses the output of the console. `verbose` writes the log to stderr; `log_file`
+    appends it to a file with UTC times, beginning with the command. Without both the log is
+    discarded.
     """
     if quiet or console.cache_info().currsize:
         console().quiet = quiet
