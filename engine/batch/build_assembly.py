@@ -28,7 +28,13 @@ from language.programs.simulation_assembly import (
 def assembly_of(
     system: System, scenario: Scenario, programs: Mapping[str, Program]
 ) -> SimulationAssembly:
-    """Return the assembly of a system and a resolved scenario."""
+    """Return the assembly of a system and a resolved scenario.
+
+    Its inputs are those of the system, then the delayed signals. Row signals are those that the
+    recorded columns read, directly or in an expression, each once. An instance is `controlled` if
+    one of its inputs reads a signal of an instance. `input_trajectories` are only of inputs and
+    delayed signals whose stimulus varies between instants.
+    """
     formulas = wire_formulas(system, scenario)
     truths = {name for name, thing in system.inputs.items() if thing.is_bool}
     truths |= {line.name for line in system.delayed_signals.values() if line.source in truths}

@@ -35,7 +35,9 @@ from language.model.system import Scenario, Stimulus, StimulusPiece, System
 def run_interpreted_batch(batch: Batch, build: BuildStepper = Interpreter) -> BatchResult:
     """Return the results of all variants; `build` creates the stepper of a Program.
 
-    Raises ValueError for a batch without variants.
+    The variants run in the order of the groups of `group_variants`; results are in the order of the
+    batch, with the note `interpreter`. Raises ValueError for a batch without variants or with
+    unknown names, and SpecError for a value that the checks refuse.
     """
     result: BatchResult | None = None
     for group in group_variants(batch):
@@ -49,7 +51,11 @@ def run_interpreted_batch(batch: Batch, build: BuildStepper = Interpreter) -> Ba
 
 
 def allocate_result(batch: Batch, binding: ParameterBinding, note: str) -> BatchResult:
-    """Return a result with arrays of NaN, zeros and `NO_EVENT`, to be filled by variant."""
+    """Return a result to be filled by variant, whose `note` names the executor.
+
+    Statistics, outputs and event times are NaN, counts 0, event kinds `NO_EVENT`, faults and stops
+    empty. `times` are the rows of `record` from 0 s to the horizon, which has to be set.
+    """
     horizon = binding.scenario.horizon
     assert horizon is not None
     grid = TimeGrid(Fraction(0), binding.scenario.every)
@@ -70,9 +76,10 @@ def allocate_result(batch: Batch, binding: ParameterBinding, note: str) -> Batch
 
 
 def list_event_kinds(programs: Mapping[str, Program]) -> tuple[EventKind, ...]:
-    """Return the event kinds of some instances, each once.
+    """Return the event kinds of some instances, in their order, each once.
 
-    For each instance these are its transitions, then ranges, then invariants.
+    For each instance these are its transitions (with the names of source and target), then `range
+    <signal>` for variables with a range and signals of fault bits, then `invariant <name>`.
     """
     kinds: list[EventKind] = []
     for name, program in programs.items():
@@ -95,15 +102,21 @@ def _ranged_signals(program: Program) -> list[str]:
 
 
 def row_range(statistic: SignalStatistic, every: Fraction, count: int) -> tuple[int, int]:
-    """Return the index of the first row of a statistic and the index after its last row."""
+    """Return the index of the first row of a statistic and the index after its last row.
+
+    Rows are `every` [s] apart from 0 s, `count` in number. The first row is not before `since`, the
+    last not after `until`; without `until` it is the last of all. The first index may be larger
+    than the second, if no row lies in the span.
+    """
     until = count - 1 if statistic.until is None else statistic.until // every
     return -int(-statistic.since // every), min(count, int(until) + 1)
 
 
 def evaluate_statistic(statistic: SignalStatistic, values: Reals) -> float:
-    """Return a statistic of the rows in its span; NaN without rows or with a NaN among them.
+    """Return a statistic of `values`; NaN if they are empty or one of them is NaN.
 
-    Sums are accumulated from the first to the last row, as in C.
+    `peak` is the largest magnitude, `rms` the root of the mean square. Sums are accumulated from
+    the first to the last value, as in C.
     """
     if not len(values) or np.any(np.isnan(values)):
         return math.nan
@@ -125,7 +138,11 @@ def evaluate_statistic(statistic: SignalStatistic, values: Reals) -> float:
 
 
 def scenario_of_variant(batch: Batch, scenario: Scenario, variant: int) -> Scenario:
-    """Return the scenario with the inputs and the seed of a variant."""
+    """Return `scenario` with the inputs and the seed of a variant of the batch.
+
+    Stimuli of `variant_inputs` replace those of the scenario, and steps of `inputs` replace both.
+    Without `seeds` the seed of the scenario remains.
+    """
     inputs = dict(scenario.inputs)
     if batch.variant_inputs:
         inputs.update(batch.variant_inputs[variant])
@@ -138,7 +155,11 @@ def scenario_of_variant(batch: Batch, scenario: Scenario, variant: int) -> Scena
 def tunable_values(
     batch: Batch, binding: ParameterBinding, variant: int
 ) -> dict[tuple[str, str], float]:
-    """Return the values [SI] of a variant by instance and tunable parameter."""
+    """Return the values [SI] of a variant by instance and tunable parameter.
+
+    Swept names that need Programs of their own are left out. A swept initial value has the
+    parameter `start_of_<state>`.
+    """
     arrays = {**batch.parameters, **batch.initial}
     return {place: float(arrays[name][variant]) for name, place in binding.tunables.items()}
 
@@ -182,10 +203,11 @@ def run_variant(
     binding: ParameterBinding,
     build: BuildStepper = Interpreter,
 ) -> None:
-    """Run a variant and store its results in the arrays of `result`.
+    """Run a variant and store its results at its index in `result`.
 
-    These are statistics, outputs, events, faults and the stop reason. Of the events the first
-    `max_events` are stored.
+    Outputs keep their initial value after the end of a run that stopped. Of the events the first
+    `max_events` are stored, and all are counted. `faults` and `stopped` get an entry only if there
+    are faults or the run stopped. Raises ValueError for an event whose kind `result` lacks.
     """
     run = _simulate_variant(batch, binding, variant, build)
     for name, array in result.outputs.items():

@@ -62,9 +62,11 @@ class ProgramGroup:
 def bind_parameters(batch: Batch) -> ParameterBinding:
     """Return the binding of the swept names of a batch.
 
-    If the Programs are equal at both ends of the ranges, all names are tunable; otherwise each name
-    is decided on its own. Raises ValueError for unknown names, and SpecError for a value that the
-    checks refuse.
+    All names are tunable if the Programs at both ends of the bounds differ only in tunable and
+    derived values. The bounds are the declared ranges, where they contain all values, else the
+    least and largest value; if declared ranges fail, the latter are tried. Otherwise each parameter
+    is decided on its own, initial values are tunable, and `bounds` are empty. Raises ValueError as
+    `require_known_names`, and SpecError for a value that the checks refuse.
     """
     require_known_names(batch)
     scenario = _without_initial(resolve_recording(batch.system, batch.scenario), batch)
@@ -93,7 +95,7 @@ def bind_parameters(batch: Batch) -> ParameterBinding:
 
 
 def value_bounds(batch: Batch) -> dict[str, Bounds]:
-    """Return the least and largest value [SI] of each swept parameter."""
+    """Return the least and largest value [SI] of each swept parameter, without initial values."""
     return {name: (float(min(v)), float(max(v))) for name, v in batch.parameters.items()}
 
 
@@ -145,7 +147,9 @@ def _bind_all_tunable(
 def group_variants(batch: Batch) -> list[ProgramGroup]:
     """Return the variants grouped by the values of the parameters that need a rebuild.
 
-    The groups are sorted by these values. Without such parameters all variants are one group.
+    The groups are sorted by these values, in the order of `rebuild_reasons`; the variants of a
+    group are in the order of the batch. Without such parameters all variants are one group. Errors
+    are those of `bind_parameters`.
     """
     binding = bind_parameters(batch)
     if not binding.rebuild_reasons:
@@ -167,9 +171,11 @@ def group_variants(batch: Batch) -> list[ProgramGroup]:
 
 
 def require_known_names(batch: Batch) -> None:
-    """Raise ValueError for names or arrays that do not fit the system.
+    """Raise ValueError for names or arrays of a batch that do not fit its system.
 
-    These are unknown names, tables, arrays of a wrong length, and values that are not finite.
+    These are unknown parameters, states, inputs and signals, parameters that are tables, arrays
+    without `count` finite values, `variant_inputs` of another number than 0 or `count`, and input
+    tables that do not start at 0 s or lack a value for each start.
     """
     for name in batch.parameters:
         owner, _, short = name.partition(".")

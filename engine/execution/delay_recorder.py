@@ -20,13 +20,16 @@ class DelayRecorder:
         self._last: Fraction | None = None
 
     def start(self) -> None:
-        """Reset the recorder; the block `start` fills the histories with the present values."""
+        """Forget the last recorded time, so that the next step is recorded.
+
+        The histories are unchanged; the block `start` fills them.
+        """
         self._last = None
 
     def record_step(self, time: Fraction) -> None:
-        """Record at a time [s] that is a whole multiple of the major step, once.
+        """Run the block `record` at a time [s] that is a whole multiple of the major step.
 
-        Other times are ignored.
+        A second call at the same time, another time and a Program without delays do nothing.
         """
         if self.is_needed and time != self._last and time % self._step == 0:
             self._stepper.run("record")
@@ -37,6 +40,9 @@ class DelayRecorder:
         return float(self._stepper.get(RECORD_AGE.name)) if self.is_needed else 0.0
 
     def set_age(self, age: float) -> None:
-        """Set the time [s] since the last record, so that delays are evaluated at another time."""
+        """Set the time [s] since the last record, so that delays are evaluated at another time.
+
+        Without delays nothing is set.
+        """
         if self.is_needed:
             self._stepper.set(RECORD_AGE.name, age)

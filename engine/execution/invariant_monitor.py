@@ -25,9 +25,10 @@ class InvariantMonitor:
         self._broken: set[str] = set()
 
     def check(self, time: Fraction) -> None:
-        """Report the invariants of active modes that ceased to hold since the last call.
+        """Log an event for each invariant of an active mode that ceased to hold.
 
-        The equations have to be evaluated for the present instant [s].
+        This refers to the time since the last call. An invariant that holds again, or whose mode is
+        left, can be reported again. The equations have to be evaluated for the present instant [s].
         """
         if not self._program.invariants:
             return
@@ -42,7 +43,11 @@ class InvariantMonitor:
 
 
 def invariant_event(name: str, program: Program, info: InvariantInfo, time: float) -> Event:
-    """Return the event of an invariant that ceases to hold at a time [s]."""
+    """Return the event of an invariant that ceases to hold at a time [s].
+
+    It has the kind `invariant`, the name `invariant <name>`, its mode as source and target, and its
+    message.
+    """
     mode = program.mode_name(info.mode, info.region)
     place = (name, f"invariant {info.name}", mode, mode, info.region)
     return Event(time, 0, *place, kind="invariant", message=info.message)

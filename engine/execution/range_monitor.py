@@ -36,17 +36,18 @@ class RangeMonitor:
     def is_inside(self) -> bool:
         """Return whether all states are finite and all variables within their ranges.
 
-        The result is False as long as a reported variable is outside.
+        There is no tolerance. The result is False as long as a variable that `check` reported has
+        not been seen inside by `check`.
         """
         values = self._read_all()
         is_inside = all(map(le, self._lows, values)) and all(map(le, values, self._highs))
         return is_inside and not self._outside
 
     def check(self, time: Fraction) -> None:
-        """Report the variables that left their range since the last call.
+        """Log an event for each variable with a declared range that left it since the last call.
 
-        The bounds have a relative tolerance. A variable that returned to its range is reported
-        again when it leaves.
+        The range is widened on both sides by `RANGE_TOLERANCE` times its width; NaN is outside. A
+        variable that returned to its range is reported again when it leaves.
         """
         for (variable, (low, high)), value in zip(self._bounds.items(), self._read(), strict=True):
             slack = RANGE_TOLERANCE * (high - low)
@@ -62,10 +63,16 @@ class RangeMonitor:
 
 
 def format_range_violation(variable: str, value: float, low: float, high: float) -> str:
-    """Return the message for a variable outside its range."""
+    """Return the message "`name` = value is outside its range low .. high".
+
+    The name is without its group; the value has six significant digits.
+    """
     return f"`{unqualified_name(variable)}` = {value:.6g} is outside its range {low:g} .. {high:g}"
 
 
 def range_event(time: float, instance: str, signal: str, mode: str, message: str) -> Event:
-    """Return the event of a signal that left its range at a time [s] in a mode."""
+    """Return the event of a signal that left its range at a time [s].
+
+    It has the kind `range`, the name `range <signal>`, and `mode` as source and target.
+    """
     return Event(time, 0, instance, f"range {signal}", mode, mode, kind="range", message=message)

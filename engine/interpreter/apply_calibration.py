@@ -16,7 +16,9 @@ DERIVE_BLOCKS = ("derive", "compare_stamps")
 def calibrate(stepper: Stepper, program: Program, values: Mapping[str, Fraction]) -> bool:
     """Set tunable parameters and run the derive blocks; return whether the Program has any of them.
 
-    Values are rounded to the number type; parameters that the Program lacks are ignored.
+    Keys are parameter names without `calibration.`; names that the Program lacks are ignored.
+    Values are rounded to the number type. Of `DERIVE_BLOCKS` those that exist run, once, after all
+    values are set; without a known name none runs.
     """
     known = {constant.name for constant in program.constants}
     used = {f"calibration.{name}": value for name, value in values.items()}

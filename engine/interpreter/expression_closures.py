@@ -120,7 +120,7 @@ EXPRESSION_FUSED: Mapping[tuple[str, str], FusedFactory] = {
 
 
 def range_test(a: int, low: int, b: int, high: int) -> ExpressionClosure:
-    """Return the closure of `v[a] >= v[low] and v[b] <= v[high]`."""
+    """Return the closure of `v[a] >= v[low] and v[b] <= v[high]`; both sides are evaluated."""
     return lambda v: (v[a] >= v[low]) & (v[b] <= v[high])
 
 
@@ -159,7 +159,10 @@ def select(
 def call_function(
     function: Callable[..., Any], arguments: Sequence[ExpressionClosure]
 ) -> ExpressionClosure:
-    """Return the closure of a function call; arguments are evaluated from left to right."""
+    """Return the closure that calls a function with any number of arguments.
+
+    The arguments are evaluated from left to right.
+    """
     match arguments:
         case [a]:
             return lambda v: function(a(v))

@@ -57,12 +57,20 @@ class Interpreter:
                 self.run(entry)
 
     def get(self, name: str) -> Any:
-        """Return the value of a variable or constant, `group.name`."""
+        """Return the value of a variable or constant, `group.name`.
+
+        A float32 is returned as a Python float; arrays as they are stored. Raises KeyError for an
+        unknown name.
+        """
         value = self._frame[self._slots[name]]
         return value if self._is_float64 else self._arithmetic.to_python(value)
 
     def set(self, name: str, value: float | int | bool) -> None:
-        """Set a variable; a real is rounded to the number type."""
+        """Set a variable or constant, `group.name`; a real is rounded to the number type.
+
+        Values of other types are stored as given. Derived values are not updated. Raises KeyError
+        for an unknown name.
+        """
         if name in self._real:
             if self._is_float64:
                 value = float(value)
@@ -72,18 +80,21 @@ class Interpreter:
         self._frame[self._slots[name]] = value
 
     def pop_range_violations(self) -> tuple[str, ...]:
-        """Return the signals that left their range since the last call, and clear the record."""
+        """Return the signals that left their range since the last call, and clear the record.
+
+        Each signal occurs once, in the order of the first violations.
+        """
         violations = self._frame[self._slots[RANGE_VIOLATIONS]]
         names = tuple(violations)
         violations.clear()
         return names
 
     def has(self, name: str) -> bool:
-        """Return whether the Program has a variable or constant."""
+        """Return whether the Program has a variable or constant of the name `group.name`."""
         return name in self._slots
 
     def run(self, block: str) -> None:
-        """Run a block."""
+        """Run a block of the Program on the frame. Raises KeyError for an unknown block."""
         if self._is_float64:
             self._blocks[block](self._frame)
         else:
@@ -91,7 +102,10 @@ class Interpreter:
                 self._blocks[block](self._frame)
 
     def make_reader(self, names: tuple[str, ...]) -> Callable[[], tuple[Any, ...]]:
-        """Return a function that returns the values of some variables, in their order."""
+        """Return a function that returns the present values of some names, in their order.
+
+        The values are those of `get`. Raises KeyError for an unknown name.
+        """
         slots = [self._slots[name] for name in names]
         frame, to_python = self._frame, self._arithmetic.to_python
         if self._is_float64 and len(slots) > 1:

@@ -33,7 +33,7 @@ class Arithmetic:
     to_python: Callable[[Any], Any]
 
     def to_frame_value(self, value: float | int | bool) -> Any:
-        """Return a value as it is stored in a frame: a float rounded to the type, others as is."""
+        """Return a value as a frame stores it: floats rounded to the type, int and bool as is."""
         return self.real(value) if isinstance(value, float) else value
 
 

@@ -19,7 +19,10 @@ def no_op(v: Frame) -> None:
 
 
 def sequence(statements: Sequence[StatementClosure]) -> StatementClosure:
-    """Return the closure of statements in order; statements without effect are dropped."""
+    """Return the closure that runs statements in order.
+
+    Each `no_op` is dropped. Without others the result is `no_op`; a single one is returned itself.
+    """
     match [action for action in statements if action is not no_op]:
         case []:
             return no_op
@@ -50,9 +53,10 @@ def sequence(statements: Sequence[StatementClosure]) -> StatementClosure:
 
 
 def assign(targets: Sequence[int], values: Sequence[ExpressionClosure]) -> StatementClosure:
-    """Return the closure of one to four assignments in order.
+    """Return the closure that assigns the values to the target slots, one after the other.
 
-    Raises ValueError for another number.
+    A later value sees the earlier assignments. Raises ValueError unless there are one to four
+    targets and as many values.
     """
     match targets, values:
         case [s], [a]:
@@ -89,9 +93,10 @@ def assign(targets: Sequence[int], values: Sequence[ExpressionClosure]) -> State
 
 
 def copy(targets: Sequence[int], sources: Sequence[int]) -> StatementClosure:
-    """Return the closure of one to four copies between slots, in order.
+    """Return the closure that copies source slots to target slots, one after the other.
 
-    Raises ValueError for another number.
+    A later copy sees the earlier ones. Raises ValueError unless there are one to four targets and
+    as many sources.
     """
     match targets, sources:
         case [s], [a]:
@@ -128,7 +133,10 @@ def copy(targets: Sequence[int], sources: Sequence[int]) -> StatementClosure:
 
 
 def store(slot: int, index: ExpressionClosure, value: ExpressionClosure) -> StatementClosure:
-    """Return the closure that sets an array element; the value is evaluated before the index."""
+    """Return the closure that sets an element of the array in `slot`.
+
+    The value is evaluated before the index.
+    """
 
     def act(v: Frame) -> None:
         v[slot][index(v)] = value(v)
@@ -139,9 +147,9 @@ def store(slot: int, index: ExpressionClosure, value: ExpressionClosure) -> Stat
 def branch(
     condition: ExpressionClosure, if_true: StatementClosure, if_false: StatementClosure
 ) -> StatementClosure:
-    """Return the closure of an if statement.
+    """Return the closure of an if statement; an absent branch is `no_op`.
 
-    Without statements it is `no_op`, since conditions have no effect.
+    If both branches are `no_op`, the result is `no_op`, since conditions have no effect.
     """
     if if_true is no_op and if_false is no_op:
         return no_op
@@ -163,9 +171,9 @@ def branch(
 
 
 def switch_case(slot: int, table: Mapping[int, StatementClosure]) -> StatementClosure:
-    """Return the closure that runs the statement of the number in a slot.
+    """Return the closure that runs the statement of `table` for the number in a slot.
 
-    Other numbers do nothing.
+    Other numbers do nothing. The result is `no_op` if all statements are.
     """
     if all(action is no_op for action in table.values()):
         return no_op
@@ -177,7 +185,10 @@ def switch_case(slot: int, table: Mapping[int, StatementClosure]) -> StatementCl
 
 
 def loop(count: int, slot: int, body: StatementClosure) -> StatementClosure:
-    """Return the closure of a loop of `count` turns; the slot has the index of the turn."""
+    """Return the closure of a loop of `count` turns; `slot` has the index of the turn from 0.
+
+    After the loop the slot keeps the last index.
+    """
 
     def act(v: Frame) -> None:
         for index in range(count):
@@ -192,7 +203,8 @@ def loop_while(
 ) -> StatementClosure:
     """Return the closure of a loop of at most `count` turns that ends when a condition is false.
 
-    The condition does not depend on the index, so it would remain false in the remaining turns.
+    The condition is evaluated before each turn, after `slot` is set to the index from 0. It does
+    not depend on the index, so it would remain false in the remaining turns.
     """
 
     def act(v: Frame) -> None:
@@ -206,9 +218,9 @@ def loop_while(
 
 
 def count_while(slot: int, condition: ExpressionClosure, limit: int) -> StatementClosure:
-    """Return the closure that counts up to a limit while a condition holds.
+    """Return the closure that updates a counter in a slot.
 
-    The counter is set to 0 if the condition is false.
+    If the condition holds, the counter is increased by 1 up to `limit`, else it is set to 0.
     """
 
     def act(v: Frame) -> None:
@@ -222,9 +234,10 @@ def count_while(slot: int, condition: ExpressionClosure, limit: int) -> Statemen
 
 
 def set_fault(slot: int, bit: int, signal: str, violations_slot: int) -> StatementClosure:
-    """Return the closure that sets a fault bit.
+    """Return the closure that sets the bits of the mask `bit` in the variable at `slot`.
 
-    It records `signal` as having left its range, unless the name is empty.
+    It adds `signal` to the dict at `violations_slot`, as having left its range, unless the name is
+    empty.
     """
 
     def act(v: Frame) -> None:
@@ -236,7 +249,7 @@ def set_fault(slot: int, bit: int, signal: str, violations_slot: int) -> Stateme
 
 
 def clear_fault(slot: int, bit: int) -> StatementClosure:
-    """Return the closure that clears a fault bit."""
+    """Return the closure that clears the bits of the mask `bit` in the variable at `slot`."""
 
     def act(v: Frame) -> None:
         v[slot] &= ~bit

@@ -24,7 +24,11 @@ class FrameLayout:
     literals: dict[str, int] = field(default_factory=dict)
 
     def slot_of_literal(self, value: Any) -> int:
-        """Return the slot of a literal; a new literal is appended to the frame."""
+        """Return the slot of a literal; a new literal is appended to the frame.
+
+        Literals are equal if type and `repr` are, so that 0, 0.0, -0.0 and False have different
+        slots.
+        """
         key = f"{type(value).__name__} {value!r}"  # 0, 0.0, -0.0 and False are different literals
         if key not in self.literals:
             self.literals[key] = len(self.values)
@@ -32,12 +36,16 @@ class FrameLayout:
         return self.literals[key]
 
     def new_frame(self) -> Frame:
-        """Return a frame with the initial values; arrays and dicts are copied."""
+        """Return a new frame with the initial values; lists are copied, dicts are empty."""
         return [list(v) if type(v) is list else {} if type(v) is dict else v for v in self.values]
 
 
 def frame_layout_of(program: Program) -> FrameLayout:
-    """Return the layout of a Program: variables, then constants, then the range violations."""
+    """Return the layout of a Program: variables, constants, then `RANGE_VIOLATIONS`.
+
+    Variables are 0 or false (`INITIAL_VALUES`), arrays lists of them. Constants have their values
+    in the number type; a table is a tuple. The last slot has an empty dict.
+    """
     value = ARITHMETIC_OF_TYPE[program.number_type].to_frame_value
     names = [v.name for v in program.variables] + [c.name for c in program.constants]
     initial = {kind: value(number) for kind, number in INITIAL_VALUES.items()}

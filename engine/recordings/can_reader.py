@@ -27,9 +27,12 @@ FrameKey = tuple[int, bool]
 
 
 def read_can(path: Path, mapping: RecordingMap) -> RecordedFile:
-    """Read a log of CAN frames.
+    """Read a log of CAN frames (`.blf`, `.asc`, `.log`) with the databases of the map.
 
-    Raises SpecError, and MissingToolError without python-can or cantools.
+    Names are the signals of messages that occur in the log, both as `signal` and `message.signal`;
+    values are decoded when a signal is read. Raises SpecError if a file cannot be read or
+    understood, the log is empty or too large, or the map names no database; MissingToolError
+    without python-can or cantools.
     """
     source = Source(display_path(path))
     require_size(path, source)

@@ -43,7 +43,11 @@ LOGGER_UNITS = {
 def require_names(
     file: RecordedFile, names: Sequence[str], mapping: RecordingMap, problems: Problems
 ) -> None:
-    """Report columns that a map reads and a file lacks or has twice, and a file without rows."""
+    """Report each of `names` that a file lacks or has more than once, and a file without rows.
+
+    Nothing is raised. The hint for a missing name is that of the file (`explain_missing`), else a
+    similar name.
+    """
     for name in dict.fromkeys(names):
         count = list(file.names).count(name)
         if not count:
@@ -74,20 +78,25 @@ class ChannelReader:
 
     @cached_property
     def shared_times(self) -> tuple[Fraction, ...]:
-        """Time stamps [s] of all rows; empty if one is blank or invalid."""
+        """Time stamps [s] that all columns share.
+
+        They are empty if one is blank or invalid, and for a file whose channels have their own.
+        """
         known = tuple(time for time in self.clock if time is not None)
         return known if len(known) == len(self.clock) else ()
 
     @property
     def has_max_problems(self) -> bool:
-        """Return whether `MAX_PROBLEMS` problems are reported, so that reading can stop."""
+        """Return whether `MAX_PROBLEMS` or more problems are reported, so that reading can stop."""
         return len(self.problems.reported) >= MAX_PROBLEMS
 
     def times(self, name: str) -> list[Fraction | None]:
-        """Return the time stamps of a column [s]; None for a blank or invalid cell.
+        """Return the exact time stamps of a column [s]; None for a blank or invalid cell.
 
-        Invalid stamps are reported, and stamps that do not increase. Blank cells of the main time
-        column are reported too. Reading stops after `MAX_PROBLEMS` problems.
+        A stamp is invalid if it is no decimal number, longer than `MAX_STAMP_LENGTH` or not below
+        `TIME_LIMIT` in its unit. Invalid stamps are reported, and stamps that are not above the
+        last valid one (these are kept). Blank cells are reported in the main time column only.
+        Reading stops after `MAX_PROBLEMS` problems; the list is then shorter than the column.
         """
         samples = self.file.read(name)
         factor = self.mapping.time_unit.factor
@@ -139,11 +148,14 @@ class ChannelReader:
         return stamps
 
     def samples(self, column: ColumnMapping) -> tuple[tuple[Fraction, ...], tuple[float, ...]]:
-        """Return the time stamps [s] and SI values of a column of the map.
+        """Return the time stamps [s] and SI values of a column of the map, of equal length.
 
-        Several columns of the file are averaged, then scaled, and the delay is added to the stamps.
-        Rows without a value are skipped. Values without a time stamp, values that are not finite
-        and a column without values are reported.
+        Stamps are those of the file's channels (`is_stamped`), of the column's own time column, or
+        the shared ones. Several columns of the file are averaged row by row, then multiplied by
+        scale and sign; the delay is added to the stamps. Rows are skipped if one of the columns has
+        no value or the stamp is missing. Reported are a blank stamp beside a value (own time
+        column), values that are not finite (NaN cells are skipped, overflows kept), empty cells if
+        the map refuses them, another unit in the file, and a column without values.
         """
         parts = [self.file.read(name) for name in column.columns]
         if self.file.is_stamped:
@@ -219,7 +231,10 @@ class ChannelReader:
 
 
 def file_unit(written: str) -> Unit | None:
-    """Return the unit that a logger or a DBC file writes; None if it is unknown."""
+    """Return the unit that a logger or a DBC file writes; None if it is unknown.
+
+    `LOGGER_UNITS` translates special spellings; other texts are units of modewright.
+    """
     try:
         return parse_unit(LOGGER_UNITS.get(written, written))
     except UnitError:

@@ -26,9 +26,13 @@ MAX_PLAIN_LINE = 100_000
 
 
 def read_csv(path: Path, problems: Problems) -> RecordedFile:
-    """Read a CSV file; rows whose length differs from the header are reported. Raises SpecError.
+    """Read a CSV file in UTF-8, gzipped if its suffix is `.gz`.
 
-    Reading of rows stops after `MAX_PROBLEMS` problems.
+    Cells are separated by commas; the first line that is not blank is the header, blank lines are
+    skipped. Rows whose length differs from the header are reported and left out; reading of rows
+    stops after `MAX_PROBLEMS` problems. Cells that are no decimal numbers are NaN, empty cells
+    None. Raises SpecError if the file cannot be read or unpacked, is no text, is empty or is larger
+    than `MAX_BYTES`.
     """
     source = Source(display_path(path))
     lines = _read_lines(path, source)

@@ -31,9 +31,11 @@ MIN_SIZE = 168
 
 
 def read_mdf(path: Path) -> RecordedFile:
-    """Open an MDF file of version 3 or 4.
+    """Open an MDF file of version 3 or 4; channels are read on demand and cached.
 
-    Raises SpecError, and MissingToolError without asammdf.
+    Names are those of all channels but time channels (`MASTER_CHANNELS`), as often as they occur.
+    Raises SpecError if the file cannot be read, is empty, too large or does not start as MDF
+    (`MAGIC`), and MissingToolError without asammdf. Messages of asammdf are silenced.
     """
     source = Source(display_path(path))
     require_size(path, source)

@@ -13,7 +13,11 @@ from language.text.diagnostic import Source, Span
 
 
 def read_parquet(path: Path) -> RecordedFile:
-    """Read a Parquet file. Raises SpecError, and MissingToolError without pyarrow."""
+    """Read a Parquet file; columns are read on demand.
+
+    Null cells are None, cells that are no numbers NaN. Raises SpecError if the file cannot be read
+    or understood, is empty or too large, and MissingToolError without pyarrow.
+    """
     source = Source(display_path(path))
     require_size(path, source)
     arrow = import_pyarrow("a Parquet file")

@@ -44,7 +44,7 @@ class Channel:
         return np.array(self.values)
 
     def slice_samples(self, selection: slice) -> Channel:
-        """Return the channel with a slice of its samples."""
+        """Return the channel with a slice of its samples; `seconds` and `array` are sliced too."""
         part = Channel(self.column, self.times[selection], self.values[selection])
         vars(part).update(seconds=self.seconds[selection], array=self.array[selection])
         return part
@@ -65,19 +65,20 @@ class Recording:
     windows: tuple[Window, ...] = ()
 
     def is_used(self, time: Fraction) -> bool:
-        """Return whether a time [s] lies in a window; True if there are no windows."""
+        """Return whether a time [s] lies in a window, ends included; True without windows."""
         return not self.windows or any(start <= time <= end for start, end in self.windows)
 
 
 def split_by_windows(recording: Recording) -> list[Recording]:
-    """Return one recording for each window; the recording itself if it has no windows."""
+    """Return the recording cropped to each of its windows (`crop`); itself if it has no windows."""
     return [crop(recording, window) for window in recording.windows] or [recording]
 
 
 def crop(recording: Recording, window: Window) -> Recording:
     """Return the samples of a recording within a window [s], ends included.
 
-    Channels without a sample in the window are left out.
+    Channels without a sample in the window are left out. `windows` of the result is this window;
+    `start` and `end` are its intersection with those of the recording.
     """
     channels = {}
     for name, channel in recording.channels.items():
@@ -90,11 +91,13 @@ def crop(recording: Recording, window: Window) -> Recording:
 
 
 def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Recording:
-    """Read the used channels of a file: CSV (also gzipped), Parquet, MF4 or a CAN log.
+    """Read the used channels of a file: CSV (also gzipped), Parquet, MDF or a CAN log.
 
     `used` are names of columns of the map. A path `run.csv@0..12.5` selects the window from 0 s to
-    12.5 s. The result is cropped to the windows of the map and the path. Raises SpecError with all
-    problems, and MissingToolError if a library is not installed.
+    12.5 s. The result is cropped to the windows of the map and the path (`crop_to_windows`); its
+    `name` is that of the path. `start` and `end` are those of the shared time column, else of the
+    channels. Raises SpecError with all problems, and MissingToolError if a library is not
+    installed.
     """
     problems = Problems()
     file = open_recording(path, mapping, problems)
@@ -130,9 +133,12 @@ def _share_seconds(channels: Iterable[Channel]) -> None:
 
 
 def open_recording(path: Path, mapping: RecordingMap, problems: Problems) -> RecordedFile:
-    """Open a file by its suffix: Parquet, MDF, CAN log, or CSV for any other suffix.
+    """Open a file by its suffix in any case; a time window at the end of the path is ignored.
 
-    Raises SpecError and MissingToolError.
+    `.parquet` is Parquet; `.mf4`, `.mdf`, and `.dat` that starts with `MDF` are MDF; `.blf`, `.asc`
+    and `.log` are CAN logs; all others CSV, whose faulty rows are added to `problems`. Raises
+    SpecError for a pipe, a device and a file that cannot be read, and MissingToolError if a library
+    is not installed.
     """
     path = strip_window_suffix(path)
     require_regular_file(path, Source(display_path(path)))
@@ -164,7 +170,9 @@ def _is_mdf(path: Path) -> bool:
 def crop_to_windows(recording: Recording, mapping: RecordingMap) -> Recording:
     """Return a recording from the start of its first window to the end of its last one.
 
-    Raises SpecError if a channel has no value in one of the windows.
+    Samples between windows are kept, and so are `windows`; without windows the recording itself is
+    returned. Raises SpecError, at the place of the map, for each channel without a value in a
+    window.
     """
     if not recording.windows:
         return recording

@@ -52,13 +52,13 @@ class RecordedFile:
 
     @property
     def header_span(self) -> Span:
-        """Place of the names: the first line of the file."""
+        """Place of the names: the whole first line of the file; a binary file has one character."""
         lines = self.source.lines
         return Span(self.source, 1, 1, max(1, len(lines[0])) if lines else 1)
 
 
 def require_size(path: Path, source: Source) -> None:
-    """Raise SpecError if a file cannot be read, is empty or is larger than `MAX_BYTES`."""
+    """Raise SpecError if a file cannot be opened, is empty or is larger than `MAX_BYTES`."""
     try:
         size = path.stat().st_size
         with path.open("rb"):
@@ -80,7 +80,7 @@ def require_size(path: Path, source: Source) -> None:
 def require_regular_file(path: Path, source: Source) -> None:
     """Raise SpecError for a pipe or a device, which may be endless and can be read only once.
 
-    A missing file passes; the reader reports it.
+    Directories and missing files pass; the reader reports them.
     """
     try:
         mode = path.stat().st_mode
@@ -93,12 +93,18 @@ def require_regular_file(path: Path, source: Source) -> None:
 
 
 def unreadable_error(source: Source, action: str, help: str = "") -> SpecError:
-    """Return the error of a file that cannot be read, unpacked or understood."""
+    """Return the error `the recording cannot be <action>` at line 1 of the source.
+
+    `action` is a participle with its reason, as in `read: no access`; `help` is the hint.
+    """
     problems = Problems()
     problems.error("unreadable", Span(source, 1, 1), f"the recording cannot be {action}", help)
     return SpecError(problems.reported)
 
 
 def exact_fraction(value: float) -> Fraction:
-    """Return the shortest decimal that reads back as a floating-point number, as a fraction."""
+    """Return the shortest decimal that reads back as a floating-point number, as a fraction.
+
+    Raises ValueError if the number is not finite.
+    """
     return Fraction(repr(float(value)))

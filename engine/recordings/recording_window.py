@@ -16,14 +16,15 @@ PART_PATTERN = re.compile(r"(?P<file>.+)@(?P<start>\d+(?:\.\d+)?)\.\.(?P<end>\d+
 
 
 def strip_window_suffix(path: Path) -> Path:
-    """Return the path without its time window."""
+    """Return the path without its time window `@START..END`; see `split_window_suffix`."""
     return split_window_suffix(path)[0]
 
 
 def split_window_suffix(path: Path) -> tuple[Path, Window | None]:
-    """Return the file of a path and its time window [s]; None if the path names no window.
+    """Return the file of a path `FILE@START..END` and its time window [s], exactly.
 
-    An existing file whose own name has this form is taken as a whole.
+    The window is None for a path of another form, and for an existing file whose own name has this
+    form. The ends are decimal numbers without sign or exponent; their order is not checked.
     """
     match = PART_PATTERN.fullmatch(path.name)
     if not match or path.exists():
@@ -34,7 +35,9 @@ def split_window_suffix(path: Path) -> tuple[Path, Window | None]:
 def windows_in_use(path: Path, mapping: RecordingMap, problems: Problems) -> tuple[Window, ...]:
     """Return the time windows [s] of a path: those of the map, intersected with that of the path.
 
-    An empty tuple means the whole recording. An empty intersection is reported.
+    The map's windows are those for the name of the file; without them the window of the path is
+    taken, and an empty tuple means the whole recording. Empty intersections are dropped; if all are
+    empty, this is reported as an error and the result is empty.
     """
     file, part = split_window_suffix(path)
     windows = mapping.windows_of(file.name)
@@ -53,8 +56,9 @@ def windows_in_use(path: Path, mapping: RecordingMap, problems: Problems) -> tup
 def paths_overlap(first: Path, second: Path, compare_contents: bool = True) -> bool:
     """Return whether two paths have values in common.
 
-    They have if they name the same file, or copies of it, and their time windows overlap. Copies
-    are recognised only if `compare_contents` is true.
+    They have if they name the same file, or files with the same bytes if `compare_contents` is
+    true, and their time windows overlap by more than an instant. A path without a window covers the
+    whole file. Windows of maps are not considered.
     """
     (first_file, a), (second_file, b) = split_window_suffix(first), split_window_suffix(second)
     if os.path.realpath(first_file) != os.path.realpath(second_file) and not (

@@ -32,20 +32,27 @@ NEGLIGIBLE_RATIO = 1e-9
 def simulate_reference(
     system: System, scenario: Scenario, method: ScipyMethod = "DOP853"
 ) -> Trajectory:
-    """Return the trajectory of a system through a scenario by scipy and filterpy."""
+    """Return the trajectory of a system through a scenario by scipy and filterpy.
+
+    It is `simulate` with the steppers of `reference_stepper`; `method` integrates continuous
+    instances.
+    """
     return simulate(system, scenario, partial(reference_stepper, method=method))
 
 
 def simulate_with_scipy(system: System, scenario: Scenario, method: ScipyMethod) -> Trajectory:
-    """Return the trajectory with continuous instances integrated by scipy.
+    """Return the trajectory with continuous instances integrated by a scipy method.
 
-    Sampled instances use the solved numbers of the Program.
+    Sampled instances are interpreted with the solved numbers of the Program.
     """
     return simulate(system, scenario, partial(_scipy_integrated_stepper, method=method))
 
 
 def reference_stepper(program: Program, method: ScipyMethod = "DOP853") -> Stepper:
-    """Return a stepper of a Program with the numerics of scipy and filterpy."""
+    """Return a `ScipyStepper` for a continuous Program, else an interpreter with reference numbers.
+
+    The numbers are those of `with_reference_numbers`, which may raise ValueError.
+    """
     if program.period is None:
         return ScipyStepper(program, method)
     return Interpreter(with_reference_numbers(program))
@@ -59,7 +66,8 @@ def _scipy_integrated_stepper(program: Program, method: ScipyMethod) -> Stepper:
 def with_reference_numbers(program: Program) -> Program:
     """Return a sampled Program with the numbers of its steady-gain observers recomputed.
 
-    ValueError: the Program omits an entry as 0 that is not negligible.
+    Constants of the same names get the values of `reference_numbers`; all others are unchanged.
+    Raises ValueError if the Program omits an entry as 0 that is not negligible.
     """
     numbers: dict[str, float] = {}
     for info in program.observers:
@@ -75,9 +83,10 @@ def with_reference_numbers(program: Program) -> Program:
 def reference_numbers(info: ObserverInfo) -> dict[str, float]:
     """Return the solved numbers of an observer by the names of their constants.
 
-    Phi, G (n, n), Gamma (n, inputs), L (n, measures), C (measures, n). Entries that the Program
-    omits as 0 have no name. ValueError: such an entry is above `NEGLIGIBLE_RATIO` times the largest
-    entry of its matrix; G is not checked.
+    A name is `solved.<mode>_<matrix>.<row>.<column>`. The matrices are Phi, G (n, n), Gamma (n,
+    inputs), L (n, measures), C (measures, n). Entries that the Program omits as 0 are left out.
+    Raises ValueError if such an entry is above `NEGLIGIBLE_RATIO` times the largest entry of its
+    matrix; G is not checked.
     """
     states, measures = info.states, info.measures
     sides = {

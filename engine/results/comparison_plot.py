@@ -20,8 +20,10 @@ def draw_difference(
 ) -> Picture:
     """Return a picture of two runs over their common span, windows of different modes shaded.
 
-    Each drawn signal has a panel with both runs and one with the difference A - B. `labels` name
-    the runs in the title.
+    Drawn are the `MAX_SIGNALS` signals with the largest RMS difference relative to their peak in A.
+    Each has a panel with both runs (B dashed) and one with the difference A - B at the samples of
+    A. Bands are those of mode signals that differ, or of all if none does. `labels` name the runs
+    in the title.
     """
     shown = _most_different(a, difference)
     times = a.times[(a.times >= difference.span[0]) & (a.times <= difference.span[1])]

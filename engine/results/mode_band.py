@@ -52,7 +52,8 @@ def draw_band(
 ) -> list[ModeSegment]:
     """Draw a strip with a legend of all shown modes; return its segments for `label_segments`.
 
-    `window` is the shown time [s].
+    A segment is an interval of constant mode; those outside `window`, the shown time [s], are left
+    out. A number without a name is shown as the number.
     """
     names = trajectory.modes[band.signal]
     runs = _equal_mode_runs(trajectory.times, trajectory.signals[band.signal])
@@ -79,8 +80,8 @@ def draw_band(
 def label_segments(axis: Axes, segments: Sequence[ModeSegment]) -> None:
     """Write the names of modes into segments that are wide enough.
 
-    The legend keeps the other modes. The layout of the axes has to be complete, because text widths
-    are measured. The legend can only become narrower.
+    A name may fill `LABEL_FILL` of its segment. The legend keeps the modes that are written
+    nowhere. The layout of the axes has to be complete, because text widths are measured.
     """
     left, right = axis.get_xlim()
     points_per_second = LABEL_FILL * axis.get_window_extent().width / (right - left)

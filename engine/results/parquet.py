@@ -8,7 +8,11 @@ from language.text.diagnostic import MissingToolError
 
 
 def import_pyarrow(feature: str, hint: str = "") -> ModuleType:
-    """Return pyarrow. Raises MissingToolError, whose text names `feature` and ends with `hint`."""
+    """Return pyarrow with its Parquet module loaded.
+
+    Raises MissingToolError if it is not installed; the text begins with `feature`, which needs it,
+    and ends with `hint`.
+    """
     try:
         import pyarrow
         import pyarrow.parquet

@@ -66,7 +66,10 @@ class Picture:
     figure: Figure
 
     def data(self, form: str = "png") -> bytes:
-        """Return the picture as `png`, `svg` or `pdf` bytes, without a date."""
+        """Return the picture as bytes of a format of matplotlib: `png` (130 dpi), `svg`, `pdf`.
+
+        The bytes have no date. Raises ValueError for an unknown format.
+        """
         buffer = io.BytesIO()
         metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form, {})
         with matplotlib.rc_context({"svg.hashsalt": "modewright"}):
@@ -74,7 +77,7 @@ class Picture:
         return buffer.getvalue()
 
     def save(self, path: str | Path) -> None:
-        """Write the picture to a file; its suffix gives the format."""
+        """Write the picture to a file, replacing it; its suffix gives the format, as in `data`."""
         Path(path).write_bytes(self.data(Path(path).suffix.lower()[1:]))
 
     def _repr_png_(self) -> bytes:
@@ -90,10 +93,11 @@ def draw_picture(
     span: tuple[float, float] | None = None,
     shaded: Sequence[tuple[float, float]] = (),
 ) -> Picture:
-    """Return a picture of bands and panels over a common axis of time [s].
+    """Return a picture of bands and panels, one below the other, over a common axis of time [s].
 
-    `span` is the shown time; the windows `shaded` [s] are drawn red behind the panels. Events are
-    those of the first run.
+    `span` is the shown time, without it that of all runs; an infinite end is that of the runs. The
+    windows `shaded` [s] are drawn red behind the panels. Dotted lines in each panel mark the first
+    `MAX_MARKERS` mode changes of the first run.
     """
     heights = [0.28] * len(bands) + [panel.height for panel in panels] or [1.0]
     figure = Figure(figsize=(9.0, 1.2 + sum(heights)), layout="constrained")
@@ -129,8 +133,10 @@ def draw_overview(
 ) -> Picture:
     """Return a picture of one run or two, of all signals or those that match a pattern.
 
-    The second run is dashed in the colours of the first. Raises ValueError if a pattern matches no
-    signal.
+    Patterns are those of fnmatch, with case. Mode signals of more than the implicit mode are bands,
+    others panels (`panels_by_unit`). Lines of the second run are dashed in the colours of the
+    first, and names get `labels`. The title is `title`, else the names of the runs. Raises
+    ValueError if a pattern matches no signal.
     """
     _require_matches(runs, patterns)
     two = len(runs) > 1
@@ -147,9 +153,12 @@ def draw_overview(
 def panels_by_unit(
     runs: Sequence[SampledRun], patterns: Sequence[str] = (), labels: Sequence[str] = ("A", "B")
 ) -> list[Panel]:
-    """Return panels that group signals by unit and by size.
+    """Return panels that group the signals that match a pattern by unit and by size.
 
-    Mode signals are left out; a signal in several runs has one curve for each.
+    Units come in the order of the signals. Of one unit, a signal whose peak is more than
+    `MAX_PEAK_RATIO` times below the next larger one starts another panel, and so does one beyond
+    the size of the palette. Mode signals are left out. A signal in several runs has one line for
+    each, with the label `<signal>, <label>`; all but those of the first run are dashed.
     """
     by_unit: dict[str, list[str]] = {}
     for run in runs:
@@ -207,7 +216,7 @@ def _peak(run: SampledRun, name: str) -> float:
 
 
 def axis_title(unit: str) -> str:
-    """Return the title of an axis: quantity and unit, or the unit alone."""
+    """Return the title of an axis, `quantity [unit]`; `[unit]` if `QUANTITIES` lacks the unit."""
     return f"{QUANTITIES.get(unit, '')} [{unit}]".strip()
 
 

@@ -41,10 +41,11 @@ class RecordedColumn:
 def recorded_columns(
     system: System, scenario: Scenario, programs: Mapping[str, Program]
 ) -> tuple[RecordedColumn, ...]:
-    """Return the recorded columns of a run.
+    """Return the recorded columns of a run, in the order of the names.
 
-    These are the signals that the scenario selects; by default all outputs, sensors and expressions
-    of the system.
+    The names are those of `scenario.signals`, which may be inputs, signals of instances, sensors
+    and outputs of the system. Without them they are the outputs of all instances, all sensors and
+    those outputs of the system that are expressions. Raises KeyError for an unknown name.
     """
     known: dict[str, RecordedColumn] = {}
     for name, thing in system.inputs.items():
@@ -98,7 +99,7 @@ class RowRecorder:
         self._rows.append(tuple(row))
 
     def make_row_picker(self, names: Sequence[str]) -> Callable[[RowValues], RowValues] | None:
-        """Return a function that selects a row from the values of some signals.
+        """Return a function that selects the row from a tuple of the values of `names`.
 
         The result is None if a column is an expression or its signal is not among `names`.
         """
@@ -108,12 +109,12 @@ class RowRecorder:
         return itemgetter(*places) if len(places) > 1 else lambda values: (values[places[0]],)
 
     def extend(self, times: Sequence[Fraction], rows: Iterable[RowValues]) -> None:
-        """Append complete rows with their times [s]."""
+        """Append complete rows, in the order of the columns, with their times [s]."""
         self.times += times
         self._rows += rows
 
     def signals(self) -> dict[str, Column]:
-        """Return the values of each column (n_rows,)."""
+        """Return the values of each column (n_rows,) by name, in the type of the column."""
         columns = list(zip(*self._rows, strict=True)) if self._rows else [()] * len(self.columns)
         return {
             column.name: column_array(column.type, values)
@@ -121,9 +122,9 @@ class RowRecorder:
         }
 
     def units(self) -> dict[str, str]:
-        """Return the unit of each column."""
+        """Return the unit of each column by name."""
         return {column.name: column.unit for column in self.columns}
 
     def seconds(self) -> NDArray[np.float64]:
-        """Return the times of the rows [s] (n_rows,)."""
+        """Return the times of the rows [s] (n_rows,), rounded."""
         return np.array([float(time) for time in self.times])

@@ -48,8 +48,8 @@ class ModeWindow:
 class ModeSequence:
     """Comparison of the transitions of one automaton or region in both runs.
 
-    `parted` is the index of the first transition that differs (None if none does). `apart` is the
-    largest time distance [s] of corresponding transitions before that.
+    `first_difference` is the index of the first transition that differs (None if none does).
+    `largest_time_difference` [s] is that of corresponding transitions before that.
     """
 
     instance: str
@@ -89,7 +89,10 @@ class RunDifference:
 
     @property
     def first(self) -> tuple[float, str] | None:
-        """First time [s] and signal that differ, modes included; None if there is none."""
+        """First time [s] and name of a signal above its tolerance or a mode that differs.
+
+        None if there is none; of several at one time, the first name in the alphabet.
+        """
         differences = [(item.first, item.name) for item in self.signals if item.first is not None]
         differences += [(window.start, window.signal) for window in self.windows]
         return min(differences, default=None)
@@ -107,10 +110,11 @@ def compare_runs(
 ) -> RunDifference:
     """Compare two runs at the samples of `a`; `b` is interpolated if it has other samples.
 
-    A signal may differ by the larger of `relative` times its peak in `a` and its tolerance
-    (patterns of names with values in SI); without both by nothing. Modes may differ for `slack`
-    [s]. Raises ValueError for runs without common time or signal, for different units and for a
-    tolerance that matches no signal.
+    `patterns` (fnmatch) select signals, `span` [s] limits the time. A signal may differ by the
+    larger of `relative` times its peak in `a` and its tolerances (patterns of names with values in
+    SI); without both by nothing. Windows of different modes up to `slack` [s] are left out. Raises
+    ValueError for runs without common time or signal, for different units and for a tolerance that
+    matches no common signal.
     """
     names = [name for name in a.signals if _matches(name, patterns)]
     common = [name for name in names if name in b.signals]
@@ -137,7 +141,12 @@ def compare_runs(
 
 
 def resample_signal(trajectory: Trajectory, name: str, times: Reals) -> Reals:
-    """Return a signal at times (n,): reals interpolated linearly, integers held."""
+    """Return a signal at times [s] (n,), as floats.
+
+    Reals are interpolated linearly; integers have the value of the last sample up to each time.
+    Before the first and after the last sample the nearest one holds. Samples at equal times are
+    returned as they are.
+    """
     values = trajectory.signals[name]
     if trajectory.times.tobytes() == times.tobytes():
         return values.astype(np.float64)

@@ -33,9 +33,10 @@ SideData = dict[str, Any]
 
 
 def encode_run(trajectory: Trajectory, path: Path) -> dict[Path, bytes]:
-    """Return the files of a trajectory as bytes by path: CSV and its side file, or Parquet.
+    """Return the files of a trajectory as bytes by path; nothing is written.
 
-    Raises MissingToolError without pyarrow, and ValueError for another suffix.
+    For `.csv` they are the CSV and its side file (`side_path`), for `.parquet` one file. Raises
+    ValueError for another suffix (the case is ignored), and MissingToolError without pyarrow.
     """
     if path.suffix.lower() == ".parquet":
         return {path: _encode_parquet(trajectory)}
@@ -46,10 +47,11 @@ def encode_run(trajectory: Trajectory, path: Path) -> dict[Path, bytes]:
 
 
 def read_run(path: Path) -> Trajectory:
-    """Read a trajectory that `encode_run` wrote.
+    """Read a trajectory that `encode_run` wrote, from Parquet or, for any other suffix, from CSV.
 
-    A CSV without side file has no events and no mode names. Raises SpecError, and MissingToolError
-    without pyarrow.
+    A CSV without side file has no events, no mode names and the name of the file; columns without a
+    point or exponent are integers. Raises SpecError for a file that cannot be read, is no run, is
+    damaged or does not fit its side file, and MissingToolError without pyarrow.
     """
     if path.suffix.lower() == ".parquet":
         return _read_parquet(path)

@@ -46,9 +46,9 @@ class Trajectory:
         return tuple(event for event in self.events if event.instance == instance)
 
     def csv(self) -> str:
-        """Return the samples as CSV text with a header of names and units.
+        """Return the samples as CSV text with the header `column_headers`, commas and line feeds.
 
-        Reals are the shortest decimals that read back exactly.
+        Reals are the shortest decimals that read back exactly; integers have no point.
         """
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
@@ -60,7 +60,8 @@ class Trajectory:
     def frame(self) -> Any:
         """Return a pandas DataFrame indexed by time: reals in SI, modes as categories of names.
 
-        `attrs["units"]` has the units. Raises MissingToolError without pandas.
+        The index is named `TIME_HEADER`; other integer signals stay integers. `attrs["units"]` has
+        the units. Raises MissingToolError without pandas.
         """
         try:
             import pandas
@@ -83,10 +84,10 @@ class Trajectory:
         return frame
 
     def plot(self, signals: Sequence[str] = (), span: tuple[float, float] | None = None) -> Picture:
-        """Return a picture of signals by unit, modes and events.
+        """Return a picture of signals by unit, modes and events (`draw_overview`).
 
         `signals` are patterns such as `plant.*`; all signals if empty. `span` is the shown time
-        [s].
+        [s], by default the whole run. Raises ValueError if a pattern matches no signal.
         """
         from engine.results.plot import draw_overview
 
@@ -94,7 +95,10 @@ class Trajectory:
 
 
 def column_headers(trajectory: Trajectory) -> list[str]:
-    """Return the headers of a table of samples, `name [unit]`; the first is the time."""
+    """Return the headers of a table of samples.
+
+    They are `TIME_HEADER`, then `name [unit]` of each signal in the order of `signals`.
+    """
     return [TIME_HEADER, *(f"{name} [{trajectory.units[name]}]" for name in trajectory.signals)]
 
 
@@ -106,5 +110,8 @@ def column_array(kind: str, values: Sequence[float | int | bool]) -> SignalArray
 
 
 def fault_names(name: str, program: Program, word: int) -> tuple[str, ...]:
-    """Return the names of the bits set in a fault word as `instance: fault`, lowest bit first."""
+    """Return the names of the bits set in a fault word as `instance: fault`, lowest bit first.
+
+    `name` is the instance; bit k is fault k of the Program. Other bits are ignored.
+    """
     return tuple(f"{name}: {fault}" for bit, fault in enumerate(program.faults) if word >> bit & 1)

@@ -25,11 +25,11 @@ class TimeGrid:
         self.start = start if start >= 0 else start + -(start // period) * period
 
     def has(self, time: Fraction) -> bool:
-        """Return whether a time [s] is one of the instants."""
+        """Return whether a time [s] is exactly one of the instants."""
         return time >= self.start and (time - self.start) % self.period == 0
 
     def count(self, horizon: Fraction) -> int:
-        """Return the number of instants up to the horizon [s], end included."""
+        """Return the number of instants up to the horizon [s], end included; 0 before the first."""
         return max(0, int((horizon - self.start) // self.period) + 1)
 
     def __iter__(self) -> Iterator[Fraction]:
@@ -92,14 +92,18 @@ class Schedule:
     def grids(self) -> dict[str, TimeGrid]:
         """Return the grids of ticks, samples and captures by name; a capture is `capture <name>`.
 
-        The result is meant for systems without delayed outputs; of several captures of a signal the
-        first is returned.
+        Of several captures of a signal the first is returned. Arrivals of delayed outputs have no
+        grid here, so the result is meant for systems without them.
         """
         late = {f"capture {n}": grids[0] for n, grids in self.captures.items() if grids}
         return {**self.ticks, **self.samples, **late}
 
     def instants(self) -> Iterator[Fraction]:
-        """Yield every instant from 0 to the horizon [s] in order, each once."""
+        """Yield every instant from 0 to the horizon [s] in order, each once.
+
+        Both ends are instants. The others are ticks, samples, captures, arrivals, starts of input
+        pieces and calibrations; rows are none.
+        """
         last = None
         ends = (Fraction(0), self.horizon)
         for time in heapq.merge(ends, self.events, *self._grids):
@@ -110,7 +114,7 @@ class Schedule:
             last = time
 
     def captures_at(self, time: Fraction) -> list[str]:
-        """Return the sensors and delayed signals that capture their source at an instant."""
+        """Return the delayed sensors and signals that store their source at an instant [s]."""
         return [n for n, grids in self.captures.items() if any(grid.has(time) for grid in grids)]
 
     def _require_bounded(self, scenario: Scenario) -> None:

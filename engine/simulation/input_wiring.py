@@ -48,9 +48,10 @@ class InputWiring:
         }
 
     def set_inputs(self, name: str, time: Fraction) -> bool:
-        """Set the inputs of an instance; return whether one changed.
+        """Set the connected inputs of an instance; return whether one changed.
 
-        Raises SimulationStopped for an input that is not finite, unless the Program saturates it.
+        Inputs of type bool, int and enum are converted. Raises SimulationStopped for an input that
+        is not finite, unless the Program saturates it; `time` [s] is for this message.
         """
         stepper, changed = self.steppers[name], False
         for connection in self.wires[name]:
@@ -69,10 +70,11 @@ class InputWiring:
         return changed
 
     def flag_new_inputs(self, name: str, sampling: Container[str]) -> None:
-        """Set the flags of the measured inputs of an instance.
+        """Set the flags `is_new` of the measured inputs of an instance.
 
-        A flag is true if a sensor that the input reads has sampled since the last call. `sampling`
-        are the sensors with a sample period.
+        A flag is true if a sensor that the input reads has sampled since the last call for this
+        instance. `sampling` has the names of the sensors with a sample period; an input that reads
+        none of them keeps its flag.
         """
         for connection in self.wires[name]:
             input_name = connection.target[1]
@@ -85,6 +87,9 @@ class InputWiring:
 
 
 def describe_instant(name: str, program: Program, stepper: Stepper, time: Fraction) -> str:
-    """Return the time, instance and mode for a message."""
+    """Return the text "t = <time> s, `<instance>` in mode `<mode>`" for a message.
+
+    The time has nine significant digits, the mode is that of the chart.
+    """
     mode = program.mode_name(stepper.get("memory.mode"))
     return f"t = {float(time):.9g} s, `{name}` in mode `{mode}`"

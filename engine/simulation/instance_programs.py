@@ -17,16 +17,20 @@ from language.text.diagnostic import Source, Span
 
 
 def programs_of(system: System, scenario: Scenario) -> dict[str, Program]:
-    """Return the Program of each instance for a scenario without recordings (resolved)."""
+    """Return the Program of each instance for a resolved scenario, one without a recording.
+
+    The Programs have the initial values of the scenario. Raises SpecError if a check refuses one.
+    """
     automata = automata_of(system, scenario)
     return {name: program_of(*each) for name, each in automata.items()}
 
 
 def automata_of(system: System, scenario: Scenario) -> dict[str, tuple[Automaton, list[str]]]:
-    """Return, for each instance, the automaton with initial values and the names of varying inputs.
+    """Return, by instance, its automaton with initial values and the names of its varying inputs.
 
-    A varying input of a continuous automaton changes between instants; it is interpolated by a
-    parabola inside a step.
+    The initial values of the scenario replace those of states. A varying input is an input, not of
+    type bool, of a continuous automaton that reads a system input, also delayed, whose stimulus
+    changes between instants; it is interpolated by a parabola inside a step.
     """
     automata = {}
     for name, instance in system.instances.items():

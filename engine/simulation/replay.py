@@ -61,8 +61,9 @@ class Replay:
 def used_columns(automaton: Automaton, mapping: RecordingMap) -> tuple[list[str], list[str]]:
     """Return the columns of a map that an automaton reads or compares, and the names left out.
 
-    Raises SpecError for an input without a column, a wrong dimension, an unknown output or a
-    `linear` input column.
+    Left out are columns and constants for inputs that the automaton lacks. Raises SpecError for an
+    input without a column, constant or default, an input that is fed twice, a wrong dimension, an
+    unknown output or an input column that is held `linear`.
     """
     problems = Problems()
     used, left_out = pair_columns(automaton, mapping, problems)
@@ -86,10 +87,12 @@ def replay(
 ) -> Replay:
     """Replay a recording through a sampled automaton.
 
-    Tick 0 is at the first time at which every input column has a value; tick k is k periods later.
-    An input keeps its value until the next stamp; without a new value its innovation is 0. `build`
-    creates the stepper; `on_tick` is called after each tick. Raises ValueError for a continuous
-    Program, and SpecError if the number of ticks is not in 1 to `MAX_TICKS`.
+    Tick 0 is at the first time at which every input column has a value; tick k is k periods later,
+    up to the end of the recording. An input keeps its value until the next stamp; inputs without a
+    column have the constant of the map, else their default. The trajectory has inputs as
+    `in.<name>`, outputs, and the mode of each region. `build` creates the stepper; `on_tick` is
+    called after each tick. Raises ValueError for a continuous Program, and SpecError if the number
+    of ticks is not in 1 to `MAX_TICKS`.
     """
     if program.period is None:
         raise ValueError(f"{program.name} is continuous: only a sampled automaton is replayed")

@@ -41,10 +41,10 @@ class FirstOrderLag:
         self._value = 0.0
 
     def advance(self, time: Fraction, value: float) -> None:
-        """Advance the lag to a time [s] at which the input has a value.
+        """Advance the lag to a time [s] at which the input is `value`.
 
-        The first call sets the output to the input. A second call at the same time is a step of the
-        input.
+        The input is linear since the last call. The first call sets the output to the input. A
+        second call at the same time is a step of the input: the output is unchanged.
         """
         if self._time is None:
             self._value = value
@@ -53,10 +53,10 @@ class FirstOrderLag:
         self._time, self._input = time, value
 
     def evaluate(self, time: Fraction, value: float) -> float:
-        """Return the output at a time [s] for a value of the input there; the lag is not advanced.
+        """Return the output at a time [s] at which the input is `value`; the lag is not advanced.
 
-        Without a lag this is the value. A time that is not after the last one gives the present
-        output.
+        Without a lag this is `value`. Before the first `advance`, and for a time that is not after
+        the last one, it is the present output.
         """
         if self._lag == 0.0:
             return value
@@ -68,9 +68,9 @@ class FirstOrderLag:
 
 
 def noise_stream(seed: int, name: str) -> Iterator[float]:
-    """Yield standard normal numbers of a sensor.
+    """Yield standard normal numbers of the sensor `name`, without end.
 
-    The stream depends on the seed and the name of the sensor only. Philox 4x64 (Salmon and others,
+    They depend on the seed and the name only. The generator is Philox 4x64 (Salmon and others,
     Parallel random numbers: as easy as 1, 2, 3, SC 2011), keyed by the seed and the first 8 bytes
     of the SHA-256 of the name.
     """
@@ -97,20 +97,24 @@ class SensorRun:
         self._noise = noise_stream(seed, sensor.name)
 
     def start(self, measured: float) -> None:
-        """Set the value before the first sample, from the measured signal at time 0."""
+        """Set the value before the first sample: the measured signal at time 0, quantised.
+
+        It has no noise. The lag starts at this signal; `count` is unchanged.
+        """
         self.lag.advance(Fraction(0), measured)
         self._first = measured
         self.value = self._quantise(measured)
 
     def capture(self, time: Fraction, measured: float) -> None:
-        """Store the lagged signal, which arrives one delay later."""
+        """Store the lagged signal at a time [s]; `sample` takes it one delay later."""
         self._in_transit.append(self.lag.evaluate(time, measured))
 
     def sample(self, time: Fraction, measured: float) -> None:
-        """Take a sample [SI] at a time [s], with noise and quantisation.
+        """Set `value` to a sample at a time [s], with noise and then quantisation, and count it.
 
-        A sensor with a delay takes the value captured one delay ago, or the initial one before
-        that.
+        Without a delay it is the lagged signal `measured` [SI]. With a delay `measured` is not
+        used: the sample is the oldest captured value, or the initial one before the first delay is
+        over.
         """
         if not self.sensor.delay:
             reading = self.lag.evaluate(time, measured)
@@ -124,7 +128,10 @@ class SensorRun:
         self.count += 1
 
     def evaluate(self, time: Fraction, measured: float) -> float:
-        """Return the lagged and quantised signal of a sensor without `sample`."""
+        """Return the lagged and quantised signal at a time [s], for a sensor without `sample`.
+
+        It has no noise, and the state of the sensor is unchanged.
+        """
         return self._quantise(self.lag.evaluate(time, measured))
 
     def _quantise(self, value: float) -> float:

@@ -39,14 +39,15 @@ class DelayLine:
         self._stored: deque[tuple[Fraction, Any]] = deque()
 
     def push(self, time: Fraction, value: Any) -> None:
-        """Store the value that the source has from a time [s] on."""
+        """Store the value that the source has from a time [s] on; times must not decrease."""
         self._stored.append((time, value))
 
     def at(self, time: Fraction, since: Fraction | None = None) -> Any:
-        """Return the value of the source one delay before a time; earlier, its value at the start.
+        """Return the value of the source one delay before a time [s]; earlier, its first value.
 
         `since` is the start of the present step: an input keeps the piece of its stimulus that is
-        active then. Stored values that are no longer needed are removed.
+        active then. Stored values that are no longer needed are removed, so times must not
+        decrease.
         """
         delayed = time - self.delayed_signal.delay
         if self.input_signal:
@@ -100,14 +101,15 @@ class Signals:
         self.read_inputs(self.time)
 
     def read_inputs(self, time: Fraction) -> None:
-        """Set the instant and evaluate every input of the system there."""
+        """Set `time` [s] and the present value of every input of the system."""
         self.time = time
         self._inputs = {name: signal.at(time) for name, signal in self.input_signals.items()}
 
     def current_value(self, name: str) -> Any:
-        """Return the present value of a signal.
+        """Return the present value of an output `instance.name`, input, sensor or delayed signal.
 
-        A sampled sensor returns its latest sample; a sensor without `sample` is evaluated.
+        A sampled sensor returns its latest sample; a sensor without `sample` is evaluated at
+        `time`. Raises KeyError for another name.
         """
         if name in self._outputs:
             stepper, wire = self._outputs[name]
@@ -122,7 +124,7 @@ class Signals:
         return sensor.value
 
     def varies(self, name: str) -> bool:
-        """Return whether a signal changes between instants.
+        """Return whether a signal changes between instants; False for unknown names.
 
         Only inputs, and delayed inputs, with a varying stimulus do.
         """
@@ -132,10 +134,10 @@ class Signals:
         return signal is not None and signal.varies
 
     def reader_at(self, time: Fraction, since: Fraction) -> ReadSignal:
-        """Return a reader of signals at a time [s] within the step that began at `since`.
+        """Return a function that reads signals at a time [s] within the step that began at `since`.
 
-        Inputs and delayed inputs are evaluated at that time; other signals have their present
-        values.
+        Inputs and delayed inputs are evaluated at that time, with the piece of their stimulus that
+        is active at `since`; other signals have their present values.
         """
 
         def read(name: str) -> Any:
@@ -148,7 +150,7 @@ class Signals:
         return read
 
     def evaluate_connection(self, connection: Connection, read: ReadSignal | None = None) -> Any:
-        """Return the value of a connection: a signal, an expression or a constant.
+        """Return the value of a connection: a signal, an expression or a constant (as a float).
 
         `read` reads signals; by default their present values.
         """
@@ -160,7 +162,10 @@ class Signals:
         return source.numerator / source.denominator
 
     def evaluate_formula(self, block: str, read: ReadSignal) -> Any:
-        """Return the value of an expression block of the wires with the signals that it reads."""
+        """Return the value of the expression block `block` of the wires.
+
+        The signals that it reads are set by `read` first.
+        """
         for name in self._reads[block]:
             self._wires.set(f"signal.{name}", read(name))
         self._wires.run(block)

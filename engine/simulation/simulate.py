@@ -49,8 +49,10 @@ def simulate(
 
     `build` creates the steppers: the interpreter, or an executor with the same protocol. `on_tick`
     is called after each tick of a sampled instance, and after each major step of a continuous
-    instance until an instant lies between two major steps. `programs` are the Programs of the
-    instances if they exist already. Raises SpecError for mistakes in a recording.
+    instance that has a block `step`, until an instant lies between two major steps. `programs` are
+    the Programs of the instances if they exist already. A run that stops early has its results
+    until then and the reason in `stopped`. Raises SpecError for mistakes in a recording and for too
+    many instants.
     """
     return _Simulation(system, resolve_recording(system, scenario), build, on_tick, programs).run()
 

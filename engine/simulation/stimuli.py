@@ -34,10 +34,11 @@ class InputSignal:
         self._latest = 0
 
     def at(self, time: Fraction, since: Fraction | None = None) -> float | bool:
-        """Return the value at a time [s].
+        """Return the value at a time [s]; before the first piece it is that of the first piece.
 
         `since` selects the piece that is active at that earlier time, which gives the limit from
-        below at the end of a step.
+        below at the end of a step. Negative times count as 0 in formulas and slopes. A bool input
+        gives a bool.
         """
         piece_time = time if since is None else since
         number = self._active_piece(piece_time)
@@ -50,7 +51,7 @@ class InputSignal:
         return bool(exact) if self.is_bool else exact.numerator / exact.denominator
 
     def constant_value(self, piece: StimulusPiece) -> float | bool:
-        """Return the value of a piece without slope and formula."""
+        """Return the value of a piece, without its slope and formula; a bool for a bool input."""
         exact = piece.value
         return bool(exact) if self.is_bool else exact.numerator / exact.denominator
 
@@ -62,16 +63,17 @@ class InputSignal:
         return self._latest
 
     def piece_starts(self) -> list[Fraction]:
-        """Return the times [s] above 0 at which pieces start."""
+        """Return the times [s] above 0 at which pieces start, in order."""
         return [start for start in self.starts if start > 0]
 
 
 def resolve_recording(system: System, scenario: Scenario) -> Scenario:
     """Return a scenario in which the inputs of a recording are stimuli.
 
-    Unchanged without a recording. Time 0 is the first time at which every input from the recording
-    has a value. Initial values and the horizon are taken from the recording if they refer to it or
-    are absent. Raises SpecError for mistakes in the file.
+    Without a recording the scenario itself is returned. Time 0 is the first time at which every
+    input from the recording has a value. Initial values that name a column have its latest value at
+    that time, else its first one. A missing horizon is the end of the recording. Raises SpecError
+    for mistakes in the file, and if it ends before time 0.
     """
     use = scenario.recording
     if use is None:
@@ -102,7 +104,11 @@ def resolve_recording(system: System, scenario: Scenario) -> Scenario:
 
 
 def stimulus_of(channel: Channel, start: Fraction, is_bool: bool = False) -> Stimulus:
-    """Return a channel as a stimulus from `start` [s] on, held or linear as the map says."""
+    """Return a channel as a stimulus whose time 0 is `start` [s], held or linear as the map says.
+
+    Pieces that end before time 0 are left out. The first value holds before the first sample, the
+    last one after the last.
+    """
     values = [Fraction(value) for value in channel.values]
     points = [(time - start, value) for time, value in zip(channel.times, values, strict=True)]
     pieces = linear_pieces(points) if channel.column.hold == "linear" else constant_pieces(points)

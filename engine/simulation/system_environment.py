@@ -50,7 +50,9 @@ class SystemEnvironment:
     def interpolate_inputs(self, start: Fraction, stop: Fraction) -> None:
         """Set the varying inputs to parabolas over the flow from `start` to `stop` [s].
 
-        A parabola interpolates the input at the start, the middle and the end of the flow.
+        A parabola interpolates the input at the start, the middle and the end of the flow:
+        `input.<name>` is the value at the start, `work.rise_<name>` and `work.bend_<name>` are the
+        factors of s and s^2. Other inputs are unchanged.
         """
         self._since = start
         h = float(stop - start)
@@ -63,7 +65,7 @@ class SystemEnvironment:
             self._stepper.set(f"work.bend_{name}", 2.0 * (first - 2.0 * middle + last) / (h * h))
 
     def set_inputs(self, time: Fraction) -> None:
-        """Set the varying inputs to their values at a time [s] of the flow.
+        """Set the varying inputs to their values at a time [s] of the flow; others are unchanged.
 
         At a discontinuity the value is the limit from below.
         """
@@ -72,12 +74,18 @@ class SystemEnvironment:
             self._stepper.set(name, self._input_function(connection)(time))
 
     def observe_boundary(self, time: Fraction) -> None:
-        """Advance the lags of sensors on the outputs of the instance to a time [s]."""
+        """Advance the lags of sensors on the outputs of the instance to a time [s].
+
+        Sensors without a lag are left out.
+        """
         for run in self._lagging:
             run.lag.advance(time, self._signals.current_value(run.sensor.source))
 
     def sample_outputs(self, time: Fraction) -> None:
-        """Append the outputs, and the values of sensors without `sample`, at a time [s]."""
+        """Append the outputs, and the values of sensors without `sample`, at a time [s].
+
+        The tuple in `sampled_rows` is in the order of `names`.
+        """
         values = self._read()
         for run in self._unsampled:
             value = values[self._outputs.index(run.sensor.source)]
