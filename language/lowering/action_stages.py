@@ -41,7 +41,11 @@ def lower_stage(
     known: NameBindings,
     stage_name: str = "reset",
 ) -> list[Op]:
-    """Return the operations of one stage: all assignments are evaluated, then all are stored."""
+    """Return the operations of one stage: all assignments are evaluated, then all are stored.
+
+    `formulas` are by variable, `known` the names before the stage. See `read_stage` and
+    `commit_stage`.
+    """
     return [
         *read_stage(automaton, formulas, known, stage_name),
         *commit_stage(automaton, formulas, stage_name),
@@ -54,7 +58,11 @@ def read_stage(
     known: NameBindings,
     stage_name: str = "reset",
 ) -> list[Op]:
-    """Return the first half of a stage: `work.<stage>_<name> = <value>` for each assignment."""
+    """Return the first half of a stage: `work.<stage>_<name> = <value>` for each assignment.
+
+    The value is converted to a whole number for an int or an enumeration, else to a real. The key
+    path is that of the formula after the name of the automaton.
+    """
     found: list[Op] = []
     for name, formula in formulas.items():
         value = lower_assigned_value(
@@ -68,7 +76,7 @@ def read_stage(
 def commit_stage(automaton: Automaton, names: Iterable[str], stage_name: str = "reset") -> list[Op]:
     """Return the second half of a stage: each `work.<stage>_<name>` is stored in its variable.
 
-    A value outside the range of its variable is saturated (rule 18).
+    In a sampled automaton a value outside the range of its variable is saturated (rule 18).
     """
     found: list[Op] = []
     for name in names:
@@ -88,7 +96,7 @@ def lower_stage_of_regions(
 
     `selected_variable` gives the variable of a region that holds the number of its transition, 0
     for none. `number_of` and `assignments_of` give the number and the assignments of a transition.
-    A region whose transitions assign nothing has no operations.
+    Each half is a Switch for each region; a region whose transitions assign nothing has none.
     """
     reads: list[Op] = []
     commits: list[Op] = []
@@ -120,9 +128,10 @@ def lower_stage_of_regions(
 def lower_entry(
     automaton: Automaton, target: Mode, assignments: Mapping[str, Formula], known: NameBindings
 ) -> Block:
-    """Return the entry actions of `target`, or nothing if there are no assignments.
+    """Return the entry actions of `target` as one stage, or nothing if there are no assignments.
 
-    The equations of the target that the entry reads are evaluated first, after the reset.
+    The equations of the target that the entry reads, directly or indirectly, are evaluated first as
+    `equation.<name>`. Names in `known` that are equations of the target are ignored.
     """
     if not assignments:
         return ()
@@ -133,13 +142,20 @@ def lower_entry(
 
 
 def initial_entry_assignments(automaton: Automaton) -> dict[str, Formula]:
-    """Return the entry assignments of the initial modes of all regions, by variable."""
+    """Return the entry assignments of the initial modes of all regions, by variable.
+
+    If several modes assign one variable, the last region counts.
+    """
     initial = [region.modes[region.initial] for region in automaton.all_regions]
     return {name: formula for mode in initial for name, formula in mode.entry.items()}
 
 
 def action_variables(automaton: Automaton) -> list[Variable]:
-    """Return the `work` variables of all stages, each once."""
+    """Return the `work` variables of all stages, each once.
+
+    They are `work.reset_<name>` for variables that a reset, an entry or an exit assigns, and
+    `work.next_<name>` for those that an update assigns.
+    """
     found: dict[str, Variable] = {}
     for mode in automaton.all_modes:
         resets = [transition.reset for transition in mode.transitions]
@@ -152,7 +168,10 @@ def action_variables(automaton: Automaton) -> list[Variable]:
 
 
 def discrete_variables(automaton: Automaton) -> list[Variable]:
-    """Return `discrete.<name>` for each discrete variable of an automaton."""
+    """Return `discrete.<name>` for each discrete variable, in the order of the file.
+
+    They have type, unit, values and, in a continuous automaton, the range.
+    """
     return [
         Variable(
             f"discrete.{name}",
@@ -167,7 +186,10 @@ def discrete_variables(automaton: Automaton) -> list[Variable]:
 
 
 def stage_variable(automaton: Automaton, stage_name: str, name: str) -> Variable:
-    """Return the variable `work.<stage>_<name>`, which holds a value that is not yet stored."""
+    """Return a new variable `work.<stage>_<name>`, which holds a value before it is stored.
+
+    Type, unit and values are those of the state or discrete variable `name`.
+    """
     thing = automaton.state_variables[name]
     unit = str(thing.unit.dimension)
     kind = value_type(thing.type)

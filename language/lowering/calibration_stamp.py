@@ -24,8 +24,9 @@ def calibration_stamps(
 ) -> tuple[Constant, ...]:
     """Return a constant `solved.stamp_<name>` for each tunable that a solved number reads.
 
-    Its value is that of the parameter when the spec was checked. A tunable table is reported, since
-    it has no single value.
+    They are sorted by name. The value is that of the parameter when the spec was checked.
+    `parameters` are the constants by the name of the parameter. A tunable table is reported as an
+    error and has no stamp, since it has no single value.
     """
     found = []
     for name in sorted({name for constant in constants for name in constant.depends_on}):
@@ -41,7 +42,10 @@ def calibration_stamps(
 
 
 def compare_stamps_block(stamps: Iterable[Constant]) -> Block:
-    """Return the operations that set the fault bit for each tunable that differs from its stamp."""
+    """Return the operations that set the fault bit `stale_calibration` for stamps that differ.
+
+    Each stamp is compared with the tunable parameter that it belongs to.
+    """
     ops: list[Op] = []
     for stamp in stamps:
         (name,) = stamp.depends_on

@@ -10,8 +10,8 @@ from language.model.statechart import Chart, ChartNode
 def is_active(chart: Chart, node: ChartNode, base: str) -> Expr:
     """Return the condition that a node is active: its region is in one of the node's leaves.
 
-    Leaves with consecutive numbers give one interval `low <= mode and mode <= high`. `base` is the
-    mode variable of the chart.
+    Leaves with consecutive numbers give one interval `low <= mode and mode <= high`, others a
+    disjunction of `mode == number`. `base` is the mode variable of the chart.
     """
     variable = Ref(mode_variable(base, node.region))
     numbers = sorted(leaf.number for leaf in chart.leaves_of(node) if leaf.number is not None)
@@ -29,7 +29,8 @@ def is_active(chart: Chart, node: ChartNode, base: str) -> Expr:
 def is_complete(chart: Chart, node: ChartNode, base: str) -> Expr:
     """Return the condition that a node is complete: one of its final child modes is active.
 
-    A parallel node is complete when all of its regions are; an atomic node gives a constant.
+    A parallel node is complete when all of its regions are. An atomic node gives a constant,
+    whether it is final, and so does a node without final children (false).
     """
     if node.kind == "parallel":
         return _conjunction(
@@ -46,7 +47,10 @@ def is_complete(chart: Chart, node: ChartNode, base: str) -> Expr:
 
 
 def may_complete(chart: Chart, node: ChartNode) -> bool:
-    """Return whether a node has a final mode, in each of its regions if it is parallel."""
+    """Return whether a node can be complete: it has a final child mode.
+
+    A parallel node needs one in each of its regions; an atomic node has to be final itself.
+    """
     if node.kind == "parallel":
         return all(may_complete(chart, region) for region in chart.child_regions(node))
     if node.kind == "atomic":

@@ -20,8 +20,8 @@ WIRE_RESULT = "wire.value"
 def wire_formulas(system: System, scenario: Scenario) -> dict[str, Formula]:
     """Return the formulas of a system and a scenario by the name of their block.
 
-    They are those of connections, outputs and input stimuli; a connection or an output that is a
-    signal has none.
+    They are those of connections, outputs and pieces of input stimuli, in this order; a connection,
+    an output or a piece that is no formula has none.
     """
     found: dict[str, Formula] = {}
     for connection in system.connections.values():
@@ -43,20 +43,21 @@ def connection_block(connection: Connection) -> str:
 
 
 def piece_block(name: str, number: int) -> str:
-    """Return the name of the block of a piece of an input stimulus, numbered from 0."""
+    """Return the name of the block of a piece of an input: `piece.<name>.<number>`, from 0."""
     return f"piece.{name}.{number}"
 
 
 def output_block(name: str) -> str:
-    """Return the name of the block of an output of the system."""
+    """Return the name of the block of an output of the system: `output.<name>`."""
     return f"output.{name}"
 
 
 def wires_program(formulas: Mapping[str, Formula], truths: frozenset[str]) -> Program:
     """Return a Program with one block for each formula, which reads `signal.<name>`.
 
-    Each block sets `wire.value`. The Program is named `wires` and computes in float64. `truths` are
-    the signals of type bool.
+    The keys of `formulas` are the names of the blocks. Each block sets `wire.value`. The Program is
+    named `wires` and computes in float64. `truths` are the signals of type bool; all others are
+    real.
     """
     read = {name.path for formula in formulas.values() for name in names(formula.tree)}
     known = {name: Ref(f"signal.{name}") for name in read}

@@ -37,10 +37,11 @@ from language.text.diagnostic import Problems, SpecError
 
 
 def parameter_constants(automaton: Automaton, problems: Problems) -> dict[str, Constant]:
-    """Return the constants of all parameters and of the axes of tables, by name.
+    """Return the constants of all parameters and of the axes of tables.
 
-    A parameter comes after those that it is derived from. A tunable wait is a count of ticks. A
-    value that is not finite is reported and replaced by 0.
+    Keys are the names of parameters and `axis.<name>_<k>`. A parameter comes after those that it is
+    derived from, an axis after its table. A tunable wait is a count of ticks, rounded up. A value
+    that is not finite is reported as an error and replaced by 0.
     """
     known = constant_bindings(automaton)
     kinds = parameter_kinds(automaton)
@@ -73,7 +74,7 @@ def parameter_constants(automaton: Automaton, problems: Problems) -> dict[str, C
 def axis_constants(automaton: Automaton, name: str) -> list[Constant]:
     """Return the axes of a table parameter as fixed constants `axis.<name>_<k>`, k from 1.
 
-    The list is empty for a parameter that is no table.
+    The points are rounded to the number type. The list is empty for a parameter that is no table.
     """
     table = automaton.parameters[name].table
     key = f"{declaring_automaton(automaton, name)} {automaton.parameters[name].key}.table.over"
@@ -91,9 +92,10 @@ def axis_constants(automaton: Automaton, name: str) -> list[Constant]:
 
 
 def derive_block(automaton: Automaton) -> Block:
-    """Return the assignments of the parameters that depend on tunable parameters.
+    """Return the assignments `derived.<name>` of the parameters that depend on tunable parameters.
 
-    Each comes after those that it reads.
+    Each comes after those that it reads. Parameters that are derived from fixed ones only are left
+    out.
     """
     known = constant_bindings(automaton)
     kinds = parameter_kinds(automaton)
@@ -109,7 +111,7 @@ def derive_block(automaton: Automaton) -> Block:
 
 
 def constant_values(constants: Mapping[str, Constant]) -> dict[str, Scalar]:
-    """Return the values of constants by their names in the Program; an array is a tuple."""
+    """Return the values of constants by their names in the Program; a table is a tuple."""
     found: dict[str, Any] = {c.name: c.items or c.value for c in constants.values()}
     return found
 
@@ -119,8 +121,8 @@ def evaluate_constant(
 ) -> float:
     """Return the value of a formula of parameters, computed in float64.
 
-    `what` names the quantity in messages. SpecError if the formula reads another name, or if the
-    value is not finite.
+    `values` are those of the constants by name in the Program; `what` names the quantity in
+    messages. Raises SpecError if the formula reads another name, or if the value is not finite.
     """
     problems = Problems()
     try:
@@ -147,8 +149,9 @@ def evaluate_constant(
 def evaluate_exactly(formula: Formula, automaton: Automaton) -> Fraction:
     """Return the value of a formula of numbers and parameters as an exact fraction.
 
-    Only the operations + - * /, negation and powers are allowed. SpecError for another expression
-    and for a division by zero.
+    Derived parameters are evaluated; a parameter without a value counts as 0. Only + - * /,
+    negation and whole powers are allowed. Raises SpecError for another expression and for a
+    division by zero.
     """
     problems = Problems()
 

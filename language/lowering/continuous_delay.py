@@ -75,13 +75,18 @@ class ContinuousDelay:
     def variable_name(self, part: str) -> str:
         """Return `memory.<part>_<number>`.
 
-        The parts are values, newest, far, middle, near, delay and count.
+        The parts are values (ring buffer), newest (its index), far, middle and near (the oldest
+        records), and delay and count of a tunable delay.
         """
         return f"memory.{part}_{self.number}"
 
 
 def continuous_delays_of(automaton: Automaton) -> tuple[ContinuousDelay, ...]:
-    """Return the delays of a continuous automaton, numbered from 1; inner delays come first."""
+    """Return the different delays of a continuous automaton, numbered from 1.
+
+    Inner delays come before those that contain them. Equal calls share one delay. Raises SpecError
+    if a time is not made of numbers and parameters.
+    """
     found: list[ContinuousDelay] = []
     for tree in memory_calls_by_key(automaton, ("delay",)).values():
         time, step = tree.arguments[1], automaton.step
@@ -99,7 +104,8 @@ def continuous_delays_of(automaton: Automaton) -> tuple[ContinuousDelay, ...]:
 def tunable_delay_of(automaton: Automaton, time: SyntaxTree) -> tuple[str, Fraction] | None:
     """Return the parameter that a delay is, and the upper end of its range [s].
 
-    The result is None unless the expression is the name of a tunable parameter with a range.
+    `time` is the expression of the delay. The result is None unless it is the name of a tunable
+    parameter with a range.
     """
     if isinstance(time, Name):
         parameter = automaton.parameters.get(time.path)
@@ -148,7 +154,8 @@ def _tunable_delay_value(delay: ContinuousDelay, elapsed_steps: Expr) -> Expr:
 def record_block(delays: tuple[ContinuousDelay, ...], known: NameBindings) -> Block:
     """Return the operations that record the delayed quantities at a major step.
 
-    All quantities are evaluated before the first one is stored.
+    All quantities are evaluated before the first one is stored in its ring buffer; then the oldest
+    records are copied. Nothing resets `memory.age`.
     """
     ops: list[Op] = []
     commit: list[Op] = []
@@ -163,7 +170,10 @@ def record_block(delays: tuple[ContinuousDelay, ...], known: NameBindings) -> Bl
 
 
 def fill_block(delays: tuple[ContinuousDelay, ...], known: NameBindings) -> Block:
-    """Return the operations that fill the records of each delay with its present value."""
+    """Return the operations that fill all records of each delay with its present value.
+
+    The delays are filled one after the other, so that a later one reads the earlier ones.
+    """
     ops: list[Op] = []
     for history in delays:
         value, slot = Ref(f"work.keep_{history.number}"), Ref("work.slot")
@@ -230,7 +240,11 @@ def _update_oldest_tunable(history: ContinuousDelay, newest: Ref) -> list[Op]:
 
 
 def continuous_delay_variables(delays: tuple[ContinuousDelay, ...]) -> list[Variable]:
-    """Return the variables of the delays; `finalise_program` removes the unused ones."""
+    """Return the variables of the delays; `finalise_program` removes the unused ones.
+
+    There is one set for all delays and one for each: a ring buffer of `whole_steps` + 1 values, its
+    index, and those of `ContinuousDelay.variable_name`.
+    """
     found = [
         Variable(RECORD_AGE.name, "real", "s", about="time since the last record"),
         Variable("work.slot", "whole"),
@@ -256,7 +270,9 @@ def continuous_delay_variables(delays: tuple[ContinuousDelay, ...]) -> list[Vari
 def alarms_of(automaton: Automaton) -> tuple[Alarm, ...]:
     """Return an alarm for each different `after` and `every` in the guards of each mode.
 
-    The times [s] are exact; `every` repeats.
+    The variables are `memory.after_<n>` and `memory.every_<n>`, numbered from 1 over both. The
+    times [s] are exact; `every` repeats. Raises SpecError if a time is not made of numbers and
+    parameters.
     """
     found: list[Alarm] = []
     for mode in automaton.all_modes:
@@ -269,7 +285,10 @@ def alarms_of(automaton: Automaton) -> tuple[Alarm, ...]:
 
 
 def alarm_bindings(automaton: Automaton) -> Mapping[str, NameBindings]:
-    """Return the alarm variables of `after` and `every`, by key path of mode, then memory key."""
+    """Return the alarm variables of `after` and `every`, by key path of mode, then memory key.
+
+    Each mode has an entry, which may be empty.
+    """
     alarms = iter(alarms_of(automaton))
     return {
         mode.key: {key: Ref(next(alarms).variable) for key in _timer_calls(mode)}

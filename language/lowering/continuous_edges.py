@@ -27,7 +27,11 @@ from language.model.automaton import Automaton, Mode
 
 
 def edge_bindings(automaton: Automaton) -> Mapping[str, NameBindings]:
-    """Return the conditions of edge calls in guards, by key path of the mode, then memory key."""
+    """Return the conditions of edge calls in guards, by key path of the mode, then memory key.
+
+    Each mode has an entry. An edge of `rising` and `falling` is `level and not last level`, one of
+    `changed` is `level != last level` if there was a last instant.
+    """
     found: dict[str, dict[str, Expr]] = {mode.key: {} for mode in automaton.all_modes}
     for edge in edge_detectors_of(automaton):
         is_new = _level_differs(automaton, edge)
@@ -40,9 +44,10 @@ def edge_bindings(automaton: Automaton) -> Mapping[str, NameBindings]:
 
 
 def set_levels(automaton: Automaton, mode: Mode, known: NameBindings) -> list[Op]:
-    """Return the operations that evaluate the levels of a mode's edges.
+    """Return the operations that set `work.level_<n>` for the edges of a mode's region.
 
-    The levels of the other modes of its region keep the value of the last instant.
+    Edges of the mode are evaluated with `known`; those of other modes of the region keep the value
+    of the last instant. Edges of other regions have no operations.
     """
     region = {other.key for other in automaton.region(mode.region).modes.values()}
     ops: list[Op] = []
@@ -60,12 +65,15 @@ def set_levels(automaton: Automaton, mode: Mode, known: NameBindings) -> list[Op
 
 
 def level_change_conditions(automaton: Automaton) -> list[Expr]:
-    """Return, for each edge, the condition that its level differs from that of the last instant."""
+    """Return, for each edge of the automaton, the condition that its level has changed.
+
+    It is compared with the level of the last settled instant.
+    """
     return [_level_differs(automaton, edge) for edge in edge_detectors_of(automaton)]
 
 
 def store_levels(automaton: Automaton) -> Block:
-    """Return the assignments that store the levels at the end of a settled instant."""
+    """Return the assignments that store the levels of all edges at the end of a settled instant."""
     found = []
     for edge in edge_detectors_of(automaton):
         found.append(Assign(_last_level_ref(automaton, edge).name, _level_ref(automaton, edge)))
@@ -75,7 +83,10 @@ def store_levels(automaton: Automaton) -> Block:
 
 
 def reset_levels(automaton: Automaton, mode: Mode | None = None) -> Block:
-    """Return the assignments that clear the edge memory of a mode; None stands for all modes."""
+    """Return the assignments that clear the edge memory of a mode; None stands for all modes.
+
+    The last level of `rising` and `falling` becomes true; `changed` has no last value.
+    """
     edges = (
         edge_detectors_by_mode(automaton).get(mode.key, ())
         if mode
@@ -90,7 +101,7 @@ def reset_levels(automaton: Automaton, mode: Mode | None = None) -> Block:
 
 
 def level_variables(automaton: Automaton) -> list[Variable]:
-    """Return the variables of the edges of a continuous automaton."""
+    """Return the variables of the edges: present and last level and, for `changed`, two flags."""
     found = []
     for edge in edge_detectors_of(automaton):
         kind = edge_value_type(automaton, edge)

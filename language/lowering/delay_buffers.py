@@ -72,12 +72,12 @@ class SampledDelay:
 
     @property
     def variable_name(self) -> str:
-        """The variable of the values: a scalar for one tick, else a ring buffer."""
+        """The variable `memory.delay_<number>`: a scalar for one tick, else a ring buffer."""
         return f"memory.delay_{self.number}"
 
     @property
     def oldest_index(self) -> str:
-        """The variable of the index of the oldest value in the ring buffer."""
+        """The variable `memory.oldest_<number>`: the index of the oldest value in the buffer."""
         return f"memory.oldest_{self.number}"
 
 
@@ -88,9 +88,10 @@ def mode_formulas(mode: Mode) -> Iterator[Formula]:
 
 
 def action_formulas(mode: Mode) -> Iterator[Formula]:
-    """Yield the formulas of a mode other than its equations.
+    """Yield the formulas of a mode other than its equations and balances.
 
-    They are updates, entries, exits, process noise, guards, resets and `until` of a rewind.
+    They are updates, entries, exits and process noise, then guard, reset and `until` of a rewind of
+    each transition. Waits are left out.
     """
     for stage in (mode.update, mode.entry, mode.exit):
         yield from stage.values()
@@ -106,7 +107,10 @@ def action_formulas(mode: Mode) -> Iterator[Formula]:
 def memory_calls_by_key(
     automaton: Automaton, functions: tuple[str, ...]
 ) -> dict[str, FunctionCall]:
-    """Return the different calls of some functions by memory key; inner calls come first."""
+    """Return the different calls of some functions by memory key; inner calls come first.
+
+    Of calls with the same key the first one is returned.
+    """
     found: dict[str, FunctionCall] = {}
     for part in memory_calls(automaton):
         if part.function in functions:
@@ -116,7 +120,11 @@ def memory_calls_by_key(
 
 @cache_on_owner
 def memory_calls(automaton: Automaton) -> tuple[FunctionCall, ...]:
-    """Return all calls of functions with memory, with repetitions; inner calls come first."""
+    """Return all calls of functions with memory, with repetitions; inner calls come first.
+
+    The functions are MEMORY_FUNCTIONS. Searched are truth tables, then the modes with equations,
+    actions, guards and the right sides of balances.
+    """
     found: list[FunctionCall] = []
     for tree in _evaluated_trees(automaton):
         found += reversed(
@@ -130,7 +138,10 @@ def memory_calls(automaton: Automaton) -> tuple[FunctionCall, ...]:
 
 
 def uses_function(automaton: Automaton, function: str) -> bool:
-    """Return whether any expression of an automaton calls a function, with memory or without."""
+    """Return whether an expression of an automaton calls a function, with memory or without.
+
+    Searched are the same expressions as by `memory_calls`.
+    """
     parts = (part for tree in _evaluated_trees(automaton) for part in walk(tree))
     return any(isinstance(part, FunctionCall) and part.function == function for part in parts)
 
@@ -147,16 +158,17 @@ def _evaluated_trees(automaton: Automaton) -> list[SyntaxTree]:
 def evaluate_ticks(automaton: Automaton, time: SyntaxTree) -> int:
     """Return ceil(time / period) of a constant time [s], computed exactly (rule 4a).
 
-    SpecError if the time is not made of numbers and parameters.
+    Raises SpecError if the time is not made of numbers and parameters.
     """
     assert automaton.period is not None
     return math.ceil(evaluate_exactly(Formula(time, ""), automaton) / automaton.period)
 
 
 def sampled_delays_of(automaton: Automaton) -> tuple[SampledDelay, ...]:
-    """Return the `previous` and `delay` calls of an automaton, numbered from 1.
+    """Return the different `previous` and `delay` calls of an automaton, numbered from 1.
 
-    A call inside another one comes first.
+    A call inside another one comes first; equal calls share one delay. Raises SpecError if a time
+    is not made of numbers and parameters.
     """
     found: list[SampledDelay] = []
     for tree in memory_calls_by_key(automaton, DELAY_FUNCTIONS).values():
@@ -167,7 +179,10 @@ def sampled_delays_of(automaton: Automaton) -> tuple[SampledDelay, ...]:
 
 
 def expression_type(automaton: Automaton, tree: SyntaxTree) -> ValueType:
-    """Return the value type of an expression that has passed the type check."""
+    """Return the value type of an expression that has passed the type check.
+
+    It is `truth` for a bool, `whole` for an int or an enumeration, else `real`.
+    """
     scope = NameEnvironment(automaton.name_types, memory_functions=frozenset(MEMORY_FUNCTIONS))
     kind = TypeChecker(scope, Problems()).infer_type(tree)
     if kind == "truth":
@@ -178,7 +193,8 @@ def expression_type(automaton: Automaton, tree: SyntaxTree) -> ValueType:
 def add_delay_bindings(delays: tuple[SampledDelay, ...], known: NameBindings) -> dict[str, Expr]:
     """Return `known` with the value of each delayed call added under its memory key.
 
-    The value is the buffered one, or the present value until the buffers hold values.
+    The value is the buffered one, or the present value until the buffers hold values. A delay of 0
+    ticks is the present value. `known` is not changed.
     """
     found = dict(known)
     for delay in delays:
@@ -197,7 +213,9 @@ def record_delays_block(
 ) -> Block:
     """Return the operations that record the delayed values of a tick.
 
-    All values are evaluated before the first one is stored. The first record fills a ring buffer.
+    All values are evaluated before the first one is stored. The first record fills a ring buffer;
+    later ones replace its oldest value. At the end `memory.kept` becomes true. Without a delay of
+    at least one tick there are no operations.
     """
     values: list[Op] = []
     fill: list[Op] = []
@@ -223,7 +241,11 @@ def record_delays_block(
 def sampled_delay_variables(
     automaton: Automaton, delays: tuple[SampledDelay, ...]
 ) -> list[Variable]:
-    """Return the variables of delays; `finalise_program` removes the unused ones."""
+    """Return the variables of delays; `finalise_program` removes the unused ones.
+
+    They are `memory.kept`, `work.slot` and, for each delay, its values, `memory.oldest_<n>` and
+    `work.keep_<n>`. A ring buffer has one place for each tick.
+    """
     found = [
         Variable("memory.kept", "truth", about="delayed values are kept"),
         Variable("work.slot", "whole"),
@@ -244,7 +266,10 @@ def _describe_delay(delay: SampledDelay) -> str:
 
 
 def find_memory_call(automaton: Automaton) -> FunctionCall | None:
-    """Return the first call of a function with memory in the modes of an automaton, or None."""
+    """Return the first call of a function with memory in the modes of an automaton, or None.
+
+    Truth tables are not searched; an outer call comes before its arguments.
+    """
     for mode in automaton.all_modes:
         trees = [formula.tree for formula in mode_formulas(mode)]
         trees += [balance.right for balance in mode.flow.values()]

@@ -44,7 +44,10 @@ class EdgeDetector:
 
     @property
     def armed_variable(self) -> str:
-        """The truth value that an earlier tick of this activation allows an edge now."""
+        """The variable `memory.opposite_<number>`: an edge is possible now.
+
+        An earlier tick of this activation had the opposite level or, for `changed`, any value.
+        """
         return f"memory.opposite_{self.number}"
 
     @property
@@ -64,7 +67,10 @@ class PeriodicTrigger:
 
 @cache_on_owner
 def edge_detectors_of(automaton: Automaton) -> tuple[EdgeDetector, ...]:
-    """Return the different edge calls in the guards of each mode, numbered from 1."""
+    """Return the different edge calls in the guards of each mode, numbered from 1.
+
+    Equal calls in two modes are two detectors. Truth tables are not searched.
+    """
     found: dict[tuple[str, str], EdgeDetector] = {}
     for mode in automaton.all_modes:
         for part in _calls_in_guards(mode, EDGE_FUNCTIONS):
@@ -88,14 +94,18 @@ def edge_value_type(automaton: Automaton, edge: EdgeDetector) -> ValueType:
 
 
 def edge_value_ref(automaton: Automaton, edge: EdgeDetector, name: str) -> Ref:
-    """Return the reference to a variable `name` with the type of the argument of an edge call."""
+    """Return the reference to a variable `name` of the type of an edge call's argument.
+
+    It is a whole-number reference for an int or an enumeration.
+    """
     return Ref(name, edge_value_type(automaton, edge) == "whole")
 
 
 def guard_memory_bindings(automaton: Automaton, mode: Mode) -> dict[str, Expr]:
     """Return the conditions of the edge, `after` and `every` calls in a mode's guards.
 
-    The keys are the memory keys of the calls. `after` of a time of 0 ticks is true.
+    The keys are the memory keys of the calls. An edge is `work.edge_<n>`; `after` and `every`
+    compare the counter of ticks with their time. `after` of a time of 0 ticks is true.
     """
     found: dict[str, Expr] = {}
     for edge in edge_detectors_by_mode(automaton).get(mode.key, ()):
@@ -114,7 +124,11 @@ def guard_memory_bindings(automaton: Automaton, mode: Mode) -> dict[str, Expr]:
 
 
 def detect_edges(automaton: Automaton, mode: Mode, known: NameBindings) -> list[Op]:
-    """Return the operations that set `work.edge_<n>` of a mode's edges and store their levels."""
+    """Return the operations that set `work.edge_<n>` of a mode's edges and store their levels.
+
+    `known` has the names that the arguments read. `changed` needs a value of an earlier tick of
+    this activation that differs; the others need the opposite level then.
+    """
     ops: list[Op] = []
     for edge in edge_detectors_by_mode(automaton).get(mode.key, ()):
         level, seen = lower_expression(edge.call.arguments[0], known), Ref(edge.armed_variable)
@@ -135,8 +149,11 @@ def detect_edges(automaton: Automaton, mode: Mode, known: NameBindings) -> list[
 def count_ticks(automaton: Automaton) -> Iterator[Op]:
     """Yield the operations that count a tick for each `after` and `every` whose mode is active.
 
-    after    timer.after_n += 1 if its mode is active, up to the longest time of that mode
-    every    timer.every_n = 1 if timer.every_n >= period else timer.every_n + 1
+        after    timer.after_n += 1 if its mode is active, up to the longest time of that mode
+        every    timer.every_n = 1 if timer.every_n >= period else timer.every_n + 1
+
+    The counter of `after` is set to 0 while its mode is not active; that of `every` is unchanged.
+    All modes of the automaton are included.
     """
     for timer, mode, longest in _after_timers(automaton).values():
         yield Count(timer, _is_active(automaton, mode), longest, f"{automaton.name} {mode.key}")
@@ -157,7 +174,10 @@ def reset_activation(automaton: Automaton, source: Mode, target: Mode) -> list[O
 
 
 def start_timers(automaton: Automaton, target: Mode) -> list[Op]:
-    """Return the operations that set the `after` and `every` counters of an entered mode to 0."""
+    """Return the operations that set the `after` and `every` counters of an entered mode to 0.
+
+    The list is empty for a mode whose guards have neither.
+    """
     timers = _after_timers(automaton)
     ops: list[Op] = []
     if target.key in timers:
@@ -171,7 +191,11 @@ def start_timers(automaton: Automaton, target: Mode) -> list[Op]:
 
 
 def activation_variables(automaton: Automaton) -> list[Variable]:
-    """Return the variables of edge detectors and of the counters of `after` and `every`."""
+    """Return the variables of edge detectors and of the counters of `after` and `every`.
+
+    An edge has `memory.opposite_<n>`, `work.level_<n>`, `work.edge_<n>` and, for `changed`,
+    `memory.last_<n>`.
+    """
     found: list[Variable] = []
     for edge in edge_detectors_of(automaton):
         kind = edge_value_type(automaton, edge)

@@ -42,9 +42,10 @@ HAS_WAITING_EVENT = Compare("<", QUEUE_HEAD, QUEUE_TAIL)
 
 
 def event_inputs(chart: Chart, section: YamlNode | None) -> dict[str, Input]:
-    """Return the input events of a chart as inputs of type bool, by name.
+    """Return the input events of a chart as inputs of type bool with default 0, by name.
 
-    `section` is the `events` section of the document, which gives their places.
+    `section` is the `events` section of the document, which gives their places; the result is empty
+    if it is no mapping.
     """
     found = {}
     for signal in chart.events.values():
@@ -59,8 +60,8 @@ def event_inputs(chart: Chart, section: YamlNode | None) -> dict[str, Input]:
 def queue_capacity(chart: Chart, transitions: Iterable[Transition]) -> int:
     """Return the number of places of the queue of a tick.
 
-    It is the number of input events, plus the bound of micro-steps if a transition raises events: a
-    tick cannot take more of them.
+    It is the number of input events, plus the bound of micro-steps if one of the transitions raises
+    an event: a tick cannot take more of them.
     """
     raised = any(transition.raises for transition in transitions)
     inputs = sum(signal.is_input for signal in chart.events.values())
@@ -68,7 +69,11 @@ def queue_capacity(chart: Chart, transitions: Iterable[Transition]) -> int:
 
 
 def enqueue_input_events(chart: Chart) -> Block:
-    """Return the operations that fill the queue with a tick's input events and take the first."""
+    """Return the operations that fill the queue with a tick's input events and take the first.
+
+    The queue is emptied before; events come in the order of their declaration. Without an event the
+    current event is 0.
+    """
     ops: list[Op] = [Assign(QUEUE_HEAD.name, integer(0)), Assign(QUEUE_TAIL.name, integer(0))]
     for signal in chart.events.values():
         if signal.is_input:
@@ -81,7 +86,10 @@ def enqueue_input_events(chart: Chart) -> Block:
 
 
 def enqueue_event(chart: Chart, name: str, capacity: int) -> Block:
-    """Return the operations that append an event; a full queue loses it and sets a fault bit."""
+    """Return the operations that append an event; a full queue loses it and sets a fault bit.
+
+    `capacity` is the number of places; the bit is MICRO_STEP_LIMIT_FAULT.
+    """
     fits = Compare("<", QUEUE_TAIL, integer(capacity))
     return (
         Branch(fits, _append_event(chart.events[name].number), (FaultBit(MICRO_STEP_LIMIT_FAULT),)),
@@ -97,7 +105,10 @@ def _append_event(number: int) -> Block:
 
 
 def dequeue_event() -> Block:
-    """Return the operations that make the first event of the queue the current one."""
+    """Return the operations that make the first event of the queue the current one.
+
+    The queue must not be empty; this is not tested.
+    """
     return (
         Assign(CURRENT_EVENT.name, Item(QUEUE, QUEUE_HEAD, True)),
         Assign(QUEUE_HEAD.name, add(QUEUE_HEAD, integer(1))),
@@ -105,7 +116,10 @@ def dequeue_event() -> Block:
 
 
 def event_condition(chart: Chart, transition: Transition) -> Expr | None:
-    """Return the condition that the current event is one of a transition's; None if it has none."""
+    """Return the condition that the current event is one of a transition's events.
+
+    The result is None for a transition without events.
+    """
     found: Expr | None = None
     for name in transition.events:
         here = Compare("==", CURRENT_EVENT, integer(chart.events[name].number))
@@ -114,7 +128,11 @@ def event_condition(chart: Chart, transition: Transition) -> Expr | None:
 
 
 def event_queue_variables(capacity: int) -> list[Variable]:
-    """Return the variables of the queue and of the current event."""
+    """Return the variables of the queue and of the current event.
+
+    They are `work.head`, `work.tail`, `work.event` and the array `work.queue` of `capacity` places,
+    at least one.
+    """
     found = [
         Variable(QUEUE_HEAD.name, "whole", about="place in the queue of the next event to process"),
         Variable(QUEUE_TAIL.name, "whole", about="place in the queue of the next event to raise"),

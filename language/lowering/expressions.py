@@ -66,7 +66,9 @@ NameBindings = Mapping[str, Expr]
 def lower_expression(tree: SyntaxTree, known: NameBindings) -> Expr:
     """Return the Program's expression of a syntax tree, in the same order of operations.
 
-    A whole number beside a real is converted to a real. A name that `known` lacks raises KeyError.
+    A whole number beside a real is converted to a real; a literal like `2` beside a whole number is
+    one. A power becomes multiplications. Raises KeyError for a name that `known` lacks, and
+    TypeError for an expression with a problem.
     """
     return _lower_typed(tree, known)[0]
 
@@ -155,7 +157,7 @@ def lower_assigned_value(tree: SyntaxTree, known: NameBindings, whole: bool) -> 
     """Return the expression of a tree, converted to the type of its target.
 
     If `whole` is true the result is a whole number, by the call `whole` where the tree is a real;
-    otherwise it is a real.
+    otherwise a whole number becomes a real by the call `real`, and a bool stays.
     """
     number = integer_literal(tree)
     if whole and number is not None:
@@ -167,12 +169,16 @@ def lower_assigned_value(tree: SyntaxTree, known: NameBindings, whole: bool) -> 
 
 
 def to_real(expr: Expr) -> Expr:
-    """Return the expression converted to a real; one that is not a whole number is unchanged."""
+    """Return the call `real` of a whole-number expression; other expressions are unchanged."""
     return Call("real", (expr,)) if is_whole(expr) else expr
 
 
 def is_whole(expr: Expr) -> bool:
-    """Return whether the value of an expression is a whole number; values of enumerations are."""
+    """Return whether the value of an expression is a whole number; values of enumerations are.
+
+    It follows from the operands of `+`, `-`, `*` and of a selection (then-branch); a division is
+    real, and of calls only `whole` is a whole number.
+    """
     match expr:
         case Ref(_, whole) | Item(_, _, whole):
             return whole
@@ -230,7 +236,7 @@ def _expand_power(base: Expr, exponent: int) -> Expr:
 def lower_rate(balance: Balance, known: NameBindings) -> Expr:
     """Return der(state) of a balance: its right side divided by the coefficient of the derivative.
 
-    A coefficient of 1 is left out. SpecError if the left side has no such coefficient.
+    A coefficient of 1 is left out. Raises SpecError if the left side has no such coefficient.
     """
     factor = coefficient_of(balance.left, balance.state)
     if isinstance(factor, SpecError):
@@ -249,8 +255,8 @@ def lower_equations(
     """Return the assignments `<group><name> = ...` of a mode's equations, in evaluation order.
 
     `required_names` limits them to the equations that these names need, directly or through other
-    equations. `known` is changed: it gets the variable of each equation. `prefix` opens the key
-    paths.
+    equations. `known` is changed: it gets the variable of each equation returned. An equation that
+    a parallel region defines is a Switch over its mode. `prefix` opens the key paths.
     """
     order = equation_order(mode)
     needed = set(order) if required_names is None else equation_closure(mode, required_names)
@@ -285,7 +291,10 @@ def _lower_equation(mode: Mode, name: str, known: NameBindings, group: str, pref
 
 
 def choose_by_mode(region: Region, known: NameBindings, blocks: Mapping[str, Block]) -> Switch:
-    """Return a Switch over the mode of a region; `blocks` has a block for each mode by its name."""
+    """Return a Switch over the mode of a region; `blocks` has a block for each mode by its name.
+
+    The mode variable is `known["mode <region>"]`. Modes without a block do nothing.
+    """
     selector = known[f"mode {region.name}"]
     assert isinstance(selector, Ref)
     cases = tuple((region.modes[name].number, block) for name, block in blocks.items())
@@ -293,7 +302,10 @@ def choose_by_mode(region: Region, known: NameBindings, blocks: Mapping[str, Blo
 
 
 def equation_bindings(automaton: Automaton, prefix: str) -> dict[str, Expr]:
-    """Return the variable `<prefix><name>` of each equation of any mode, by name."""
+    """Return the variable `<prefix><name>` of each equation of any mode, by name.
+
+    It is a whole-number reference for an int or an enumeration.
+    """
     return {
         name: Ref(f"{prefix}{name}", whole) for name, whole in _whole_equations(automaton).items()
     }
@@ -310,7 +322,7 @@ def variable_bindings(automaton: Automaton, input_group: str) -> dict[str, Expr]
     """Return the variables of inputs, states and discrete variables, by name.
 
     An input is `<input_group>.<name>`, or `latched.<name>` if the group is `input` and the input is
-    held in a range.
+    held in a range; states are `state.<name>`, discrete variables `discrete.<name>`.
     """
     found: dict[str, Expr] = {}
     for name, thing in automaton.inputs.items():

@@ -24,9 +24,11 @@ FAULT_PRIORITY = -1
 
 
 def add_fault_transitions(automaton: Automaton) -> Automaton:
-    """Return the automaton with a transition from every other mode into its fault mode.
+    """Return the automaton with a transition `fault_mode` from every mode into its fault mode.
 
-    An automaton without a fault mode is returned unchanged.
+    The fault mode and modes inside it get none. Its guard is FAULT_GUARD, its priority
+    FAULT_PRIORITY. Only modes of the chart get one. An automaton without a fault mode is returned
+    unchanged.
     """
     if automaton.fault_mode is None:
         return automaton
@@ -71,9 +73,10 @@ def _add_fault_transition(automaton: Automaton, mode: Mode) -> Mode:
 def fault_names(
     automaton: Automaton, blocks: Mapping[str, Block], extra: Iterable[str], problems: Problems
 ) -> tuple[str, ...]:
-    """Return the fault bits: the declared ones, then `extra`, then those of ranges in use.
+    """Return the fault bits: declared ones, `extra`, then those of ranges in use, each once.
 
-    SpecError if there are more than MAX_FAULT_BITS.
+    A range is in use if an operation of the blocks sets or clears its bit. More than MAX_FAULT_BITS
+    are reported, and raise SpecError with all problems reported so far.
     """
     ops = [op for block in blocks.values() for op in walk_ops(block)]
     named = {op.fault for op in ops if isinstance(op, FaultBit)}

@@ -14,7 +14,8 @@ from language.model.chart_paths import mode_paths
 def guard_slot(region: str, index: int) -> str:
     """Return the suffix of a guard: `<index>` in the chart, `<region>_<index>` in another region.
 
-    The variables are `work.guard_<suffix>` and `memory.armed_<suffix>`.
+    `index` is that of the transition in its mode. The variables are `work.guard_<suffix>` and
+    `memory.armed_<suffix>`.
     """
     return str(index) if region == CHART else f"{region.replace('.', '_')}_{index}"
 
@@ -23,7 +24,8 @@ def guard_slot(region: str, index: int) -> str:
 def guard_slots(mode: Mode) -> list[str]:
     """Return the suffixes of all guards that are watched while a mode of the chart is active.
 
-    They are those of the mode itself, then those of its parallel regions.
+    They are those of the mode itself, then those of its parallel regions. A parallel region has as
+    many as its mode with the most transitions.
     """
     own = [guard_slot(CHART, index) for index in range(len(mode.transitions))]
     return own + [
@@ -35,7 +37,10 @@ def guard_slots(mode: Mode) -> list[str]:
 
 @cache_on_owner
 def all_guard_slots(automaton: Automaton) -> list[str]:
-    """Return the suffixes of the guard variables of all regions of an automaton."""
+    """Return the suffixes of the guard variables of all regions of an automaton.
+
+    Each region has as many as its mode with the most transitions.
+    """
     return [
         guard_slot(r.name, index)
         for r in automaton.all_regions
@@ -47,7 +52,7 @@ def mode_bindings(automaton: Automaton, base: str, prefix: str = "") -> dict[str
     """Return the conditions `in <region>.<mode>` and the mode variables `mode <region>`, by key.
 
     `base` is the mode variable of the chart; `prefix` stands before the names of regions. In a
-    chart with nested modes the conditions are those of the paths of its nodes.
+    chart with nested modes the conditions are `in <path>` for the paths of its nodes.
     """
     bindings: dict[str, Expr] = {}
     if automaton.statechart:

@@ -17,7 +17,10 @@ INVARIANT_PREFIX = "check."
 
 
 def invariant_infos(automaton: Automaton) -> tuple[InvariantInfo, ...]:
-    """Return the invariants of all modes, in the order of the file."""
+    """Return the invariants of all modes, in the order of the file.
+
+    The variable of each is `check.<mode>_<name>`, where the label of the mode contains its region.
+    """
     return tuple(
         InvariantInfo(
             name,
@@ -32,14 +35,18 @@ def invariant_infos(automaton: Automaton) -> tuple[InvariantInfo, ...]:
 
 
 def invariant_variables(automaton: Automaton) -> list[Variable]:
-    """Return the variable of the truth value of each invariant."""
+    """Return the variable `check.<mode>_<name>` of the truth value of each invariant."""
     return [
         Variable(info.variable, "truth", about=info.name) for info in invariant_infos(automaton)
     ]
 
 
 def invariant_blocks(automaton: Automaton, known: NameBindings) -> dict[str, Block]:
-    """Return the block that evaluates the invariants of the active modes; empty without any."""
+    """Return the block `invariants`, which evaluates those of the active modes, by its name.
+
+    The dict is empty without any. Equations are read as `equation.<name>`, other names as in
+    `known`. Invariants of inactive modes keep their value.
+    """
     if not invariant_infos(automaton):
         return {}
     here = {**known, **equation_bindings(automaton, "equation.")}

@@ -68,7 +68,7 @@ class LinearisationPoint:
     def evaluator(self) -> PointValue:
         """A function that returns the value of an expression at the point.
 
-        It raises SpecError if a name has no value there.
+        It raises SpecError if a name is neither in `substitutions` nor a parameter.
         """
         known = constant_bindings(self.automaton)
 
@@ -88,7 +88,8 @@ def inline_equations(mode: Mode, substitutions: Mapping[str, SyntaxTree]) -> dic
     """Return the equations of a mode in terms of states, inputs and parameters, by name.
 
     `substitutions` replaces names and is part of the result. Equations of parallel regions are not
-    inlined. SpecError if an equation would exceed MAX_INLINED_NODES, since each read copies it.
+    inlined. Raises SpecError if an equation would exceed MAX_INLINED_NODES, since each read copies
+    it.
     """
     if exceeds_inlining_limit(mode):
         problems = Problems()
@@ -107,7 +108,8 @@ def inline_equations(mode: Mode, substitutions: Mapping[str, SyntaxTree]) -> dic
 def exceeds_inlining_limit(mode: Mode) -> bool:
     """Return whether an inlined equation of a mode has more than MAX_INLINED_NODES parts.
 
-    The size grows fast: 50 equations that each read the one before twice give 2^50 parts.
+    Equations of parallel regions do not count. The size grows fast: 50 equations that each read the
+    one before twice give 2^50 parts.
     """
     sizes: dict[str, int] = {}
     for name in equation_order(mode):
@@ -121,7 +123,8 @@ def exceeds_inlining_limit(mode: Mode) -> bool:
 def symbolic_rates(mode: Mode, substitutions: Mapping[str, SyntaxTree]) -> dict[str, SyntaxTree]:
     """Return der(x) of each state of a mode's flow, with `substitutions` applied to both sides.
 
-    SpecError if a balance has no coefficient of der(x).
+    It is the right side divided by the coefficient of der(x). Raises SpecError if a balance has no
+    such coefficient.
     """
     found = {}
     for name, balance in mode.flow.items():
@@ -140,8 +143,9 @@ def symbolic_jacobian(
 ) -> SymbolicMatrix:
     """Return the derivatives of the trees (rows) by the columns at a point.
 
-    Zero entries and empty rows are left out. SpecError if a derivative does not exist, or if the
-    point does not decide which branch of a condition is taken.
+    The names of the point are replaced by their expressions. Zero entries and empty rows are left
+    out. Raises SpecError if a derivative does not exist, or if the point does not decide which
+    branch of a condition is taken.
     """
     found: SymbolicMatrix = {}
     columns = tuple(columns)
@@ -164,7 +168,8 @@ def affine_offset(
     """Return the value of the tangent of a tree where all columns are 0.
 
     The tangent is taken at the point. Sums and products are split, so only nonlinear terms read the
-    point. SpecError if a nonlinear term reads a column without a value.
+    point; a tree that reads no column is returned unchanged. Raises SpecError if a nonlinear term
+    reads a column without a value at the point.
     """
 
     def offset_of(part: SyntaxTree) -> SyntaxTree:
@@ -222,7 +227,7 @@ def _point_hint(name: str) -> str:
 
 
 def affine_form(slopes: Mapping[str, SyntaxTree], offset: SyntaxTree) -> SyntaxTree:
-    """Return the sum of slope * column over all columns, plus the offset."""
+    """Return the sum of slope * column over all columns, in their order, plus the offset."""
     parts = [multiply(slope, Name(column, offset.span)) for column, slope in slopes.items()]
     return reduce(add, [*parts, offset])
 
@@ -233,7 +238,8 @@ def linearise_model(
     """Return the model with the flow of each mode replaced by its tangent at the point of a run.
 
     Linear terms stay as they are; equations and guards are unchanged. `run.linearise` gives the
-    point; `point` supplies constants only. A mode without a tangent is reported and stays as it is.
+    point (empty without it); `point` supplies constants only. A mode without a tangent, or with a
+    slope that reads more than parameters, is reported and stays as it is.
     """
     places = {name: formula.tree for name, formula in (run.linearise or {}).items()}
     there = dataclasses.replace(point, substitutions=places)

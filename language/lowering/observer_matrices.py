@@ -32,10 +32,12 @@ def derive_observer_matrices(
 ) -> Observer | None:
     """Return an observer with the matrices of its mode of the model, as formulas.
 
-    dx/dt = A x + B u + f and y = C x + g. A, B and C are derivatives at the point `at`. f and g
-    hold the other terms, with values of states and inputs that are not in x and u. `name` is the
-    mode of this automaton. An observer without `of` is returned unchanged; None means a reported
-    problem.
+    dx/dt = A x + B u + f and y = C x + g. A, B and C are derivatives at the point `at`; u are the
+    real inputs that enter linearly with constant coefficients. f and g hold the other terms, with
+    values of states and inputs that are not in x and u. `name` is the mode of this automaton and
+    opens the names of constants. An observer without `of` is returned unchanged. None means a
+    problem, which is reported: an unknown state, a state that is left out although it moves, a name
+    without a value, or an entry of A or C that is not constant.
     """
     model = automaton.model
     if observer.of is None or model is None:

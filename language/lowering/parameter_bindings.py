@@ -21,8 +21,9 @@ from language.typecheck.types import TypeName
 def constant_bindings(automaton: Automaton) -> dict[str, Expr]:
     """Return the Program's expressions of parameters, table axes and enumeration literals, by name.
 
-    A parameter is `constant.<name>`, `calibration.<name>` or `derived.<name>`, by its kind. A table
-    adds the keys `<name> axis <k>` and `<name> size <k>`, k from 1.
+    A parameter is `constant.<name>`, `calibration.<name>` or `derived.<name>`, by its kind
+    (`parameter_kinds`); an enumeration literal is its number. A table adds the keys `<name> axis
+    <k>` and `<name> size <k>`, k from 1. The dict is cached and not to be changed.
     """
     groups = {"fixed": "constant", "tunable": "calibration", "derived": "derived"}
     found: dict[str, Expr] = {name: Value(n) for name, n in automaton.enum_literals.items()}
@@ -40,7 +41,8 @@ def constant_bindings(automaton: Automaton) -> dict[str, Expr]:
 def parameter_kinds(automaton: Automaton) -> dict[str, str]:
     """Return the kind of each parameter, in the order of the file: fixed, tunable or derived.
 
-    A parameter that is derived from fixed ones only is fixed.
+    A parameter that is derived from fixed ones only is fixed; one that reads a tunable, directly or
+    indirectly, is derived.
     """
     kinds: dict[str, str] = {}
     for name in parameter_order(automaton):
@@ -60,7 +62,10 @@ def parameter_order(automaton: Automaton) -> list[str]:
 
 
 def tunables_of(automaton: Automaton, formulas: Iterable[Formula]) -> tuple[str, ...]:
-    """Return the tunable parameters that formulas read, directly or indirectly, sorted by name."""
+    """Return the tunable parameters that formulas read, sorted by name, each once.
+
+    Parameters that are read through derived ones count too; equations are not followed.
+    """
     found: dict[str, None] = {}
     stack = names_read(formula.tree for formula in formulas)
     seen: set[str] = set()
@@ -80,8 +85,8 @@ def tunables_of(automaton: Automaton, formulas: Iterable[Formula]) -> tuple[str,
 def constant_of(automaton: Automaton, name: str, kind: str, value: float) -> Constant:
     """Return the constant of a parameter, with unit, range, key path and table values.
 
-    `kind` is fixed, tunable or derived. A tunable wait is a whole number of ticks, and its range is
-    in ticks.
+    `kind` is fixed, tunable or derived and gives the group of the name. `value` is converted to the
+    type of the parameter. A tunable wait is a whole number of ticks, and its range is in ticks.
     """
     parameter = automaton.parameters[name]
     groups = {"fixed": "constant", "tunable": "calibration", "derived": "derived"}
@@ -105,14 +110,20 @@ def constant_of(automaton: Automaton, name: str, kind: str, value: float) -> Con
 
 
 def cast_to_type(value: float, kind: TypeName) -> float | int | bool:
-    """Return a number in the Python type of a model type; a fraction is truncated to an int."""
+    """Return a number in the Python type of a model type.
+
+    `bool` gives a bool, `int` and `enum` an int (a fraction is truncated); `real` is unchanged.
+    """
     if kind == "real":
         return value
     return bool(value) if kind == "bool" else int(value)
 
 
 def declaring_automaton(automaton: Automaton, name: str) -> str:
-    """Return the name of the automaton that declares a parameter: the model or this automaton."""
+    """Return the name of the automaton that declares a parameter.
+
+    It is the model if that has a parameter of this name, else this automaton.
+    """
     model = automaton.model
     return model.name if model and name in model.parameters else automaton.name
 
@@ -120,8 +131,9 @@ def declaring_automaton(automaton: Automaton, name: str) -> str:
 def si_unit_text(automaton: Automaton, name: str) -> str:
     """Return the SI unit of a name for comments.
 
-    It is the text of the declared unit if that is an SI unit, else the text of the dimension; `1`
-    for a name without either.
+    It is the text of the declared unit if that has the factor 1 and no offset, else the text of the
+    dimension; `1` for a name without either. A name without a declared unit is looked up in the
+    dimensions of the automaton.
     """
     unit = _unit_of(automaton, name)
     if unit and unit.factor == 1 and not unit.offset:

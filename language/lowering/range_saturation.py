@@ -45,14 +45,15 @@ FAULT_HAPPENED = "work.fault_happened"
 
 
 def range_fault_of(variable: Input | State) -> str:
-    """Return the name of the fault bit of a range: the declared one or `range_<name>`."""
+    """Return the name of the fault bit of a range: the declared one, else `range_<name>`."""
     return variable.range_policy.fault or f"range_{variable.name}"
 
 
 def saturation_range(variable: Input | State) -> Range | None:
     """Return the range that values are held in; None if there is none.
 
-    An input of an enumeration has the range of the indices of its literals.
+    It is the declared one. An input of an enumeration has the range of the indices of its literals,
+    whatever is declared.
     """
     if isinstance(variable, Input) and variable.type == "enum":
         return Fraction(0), Fraction(len(variable.values) - 1)
@@ -60,12 +61,18 @@ def saturation_range(variable: Input | State) -> Range | None:
 
 
 def has_saturation(automaton: Automaton, variable: Input | State) -> bool:
-    """Return whether a variable is held in a range: it has one and the automaton is sampled."""
+    """Return whether a variable is held in a range.
+
+    It is if the automaton is sampled and `saturation_range` is not None.
+    """
     return automaton.is_sampled and saturation_range(variable) is not None
 
 
 def store_saturated(automaton: Automaton, name: str, value: Expr, key: str = "") -> list[Op]:
-    """Return the operations that write a state or discrete variable, held in its range if any."""
+    """Return the operations that write a state or discrete variable, held in its range if any.
+
+    Without a range they are one assignment; else those of `assign_saturated`.
+    """
     thing = automaton.state_variables[name]
     target = f"{'discrete' if name in automaton.discrete else 'state'}.{name}"
     if not has_saturation(automaton, thing):
@@ -74,7 +81,7 @@ def store_saturated(automaton: Automaton, name: str, value: Expr, key: str = "")
 
 
 def store_initial_value(automaton: Automaton, name: str, value: Expr, key: str) -> list[Op]:
-    """Return the operations that write the start value of a variable.
+    """Return the operations that write the start value of a variable, held in its range if any.
 
     If an invalid value would leave the variable unchanged, the lower bound is written first.
     """
@@ -92,7 +99,8 @@ def saturate_written_states(
     """Return the operations to insert before and after code that writes states without saturation.
 
     The first list saves the states whose policy keeps the old value; the second one holds the new
-    values in their ranges. Names that are no states, or have no range, are ignored.
+    values in their ranges. Both are empty for names that are no states or have no range, and in a
+    continuous automaton.
     """
     before: list[Op] = []
     after: list[Op] = []
@@ -110,7 +118,10 @@ def saturate_written_states(
 
 
 def latch_inputs(automaton: Automaton) -> Block:
-    """Return the operations that copy each input with a range to `latched.<name>`, saturated."""
+    """Return the operations that copy each input with a range to `latched.<name>`, saturated.
+
+    They are empty in a continuous automaton.
+    """
     ops: list[Op] = []
     for name, thing in automaton.inputs.items():
         if has_saturation(automaton, thing):
@@ -120,7 +131,7 @@ def latch_inputs(automaton: Automaton) -> Block:
 
 
 def initialise_latched_inputs(automaton: Automaton) -> list[Op]:
-    """Return the assignments of `latched.<name>` before the first tick.
+    """Return the assignments of `latched.<name>` before the first tick, for inputs with a range.
 
     The value is the default of the input, or 0, moved to the nearest bound of the range.
     """
@@ -134,7 +145,10 @@ def initialise_latched_inputs(automaton: Automaton) -> list[Op]:
 
 
 def bound_literals(variable: Input | State) -> tuple[Expr, Expr]:
-    """Return the lower and the upper bound of a range as literals; (0, 0) without a range."""
+    """Return the lower and the upper bound of a range as literals of the variable's type.
+
+    They are (0, 0) without a range.
+    """
     low, high = saturation_range(variable) or (Fraction(0), Fraction(0))
     return _literal(variable, low), _literal(variable, high)
 
@@ -145,7 +159,9 @@ def assign_saturated(
     """Return the operations that write a value to `target`, held in the range of `variable`.
 
     A value that is no variable, or is the target itself, is stored in `work.new_<name>` first. A
-    value outside the range sets the fault bit and may request the fault mode.
+    value outside the range sets the fault bit; the policy then clips it, takes the fallback or
+    keeps the old value. It requests the fault mode, if there is one, for `on_range: fault` and for
+    a real input that is not finite.
     """
     ops: list[Op] = []
     if not isinstance(value, Ref) or value.name == target:
@@ -167,7 +183,10 @@ def saturable_variables(automaton: Automaton) -> list[Input | State]:
 
 
 def require_ranges(automaton: Automaton) -> None:
-    """Raise SpecError with a problem for each number without a range; C needs them (rule 18)."""
+    """Raise SpecError with a problem for each real or int variable without a range (rule 18).
+
+    Checked are inputs, states and discrete variables; generated C needs their ranges.
+    """
     problems = Problems()
     for thing in saturable_variables(automaton):
         if thing.type in ("real", "int") and thing.range is None:
@@ -180,7 +199,11 @@ def require_ranges(automaton: Automaton) -> None:
 
 
 def saturation_variables(automaton: Automaton) -> list[Variable]:
-    """Return the variables of fault requests, latched inputs, and new and held values."""
+    """Return the variables of fault requests, latched inputs, and new and held values.
+
+    `latched.<name>` is only for inputs with a range; `work.new_<name>` and `work.held_<name>` are
+    for all states and discrete variables.
+    """
     found = [
         Variable(FAULT_PENDING, "truth", about="a fault asks for the fault mode"),
         Variable(FAULT_HAPPENED, "truth"),

@@ -65,14 +65,17 @@ class Rollback:
 
     @property
     def flow_mode(self) -> str | None:
-        """The mode of the model whose flow the source follows; None if the states are constant."""
+        """The mode of the model whose flow the source follows.
+
+        It is that of its run, else that of its observer; None if it has neither.
+        """
         if self.source.run:
             return self.source.run.mode
         return self.source.observer.of if self.source.observer else None
 
     @property
     def block_suffix(self) -> str:
-        """The suffix of its blocks: the mode and the index of the transition."""
+        """The suffix of its blocks: `<mode>_<index>`, the index is that in the mode, from 0."""
         return f"{self.source.name}_{self.source.transitions.index(self.transition)}"
 
     @property
@@ -84,7 +87,7 @@ class Rollback:
 
 @cache_on_owner
 def rollbacks_of(automaton: Automaton) -> tuple[Rollback, ...]:
-    """Return the transitions with `rewind` of an automaton, in the order of the file."""
+    """Return the transitions with `rewind` of the modes of the chart, in the order of the file."""
     modes = automaton.modes.values()
     return tuple(rollback for mode in modes for rollback in rollbacks_from(automaton, mode))
 
@@ -113,8 +116,8 @@ def rolled_back_states(automaton: Automaton) -> tuple[str, ...]:
 def record_tick_history(automaton: Automaton) -> Block:
     """Return the operations that record a tick after its jump; none without a rollback.
 
-    A fired transition clears the history first. The tick is recorded if the active mode is the
-    source of a rollback.
+    If a transition has fired, the history is cleared first. The tick, with the states of the model
+    and the recorded inputs, is stored if the active mode is the source of a rollback.
     """
     rollbacks = rollbacks_of(automaton)
     if not rollbacks:
@@ -146,8 +149,9 @@ def record_tick_history(automaton: Automaton) -> Block:
 def recorded_inputs(automaton: Automaton) -> dict[str, Ref]:
     """Return the variables of the inputs to record, by name, in the order of the file.
 
-    They are the inputs of the model and those that `until`, exit, reset and entry read, directly or
-    through equations.
+    They are the inputs of the model and those that `until`, exit and reset of a rollback and the
+    entry of its target read, directly or through equations. An input with a range is
+    `latched.<name>`. The dict is empty without rollbacks.
     """
     read: set[str] = set()
     for rollback in rollbacks_of(automaton):
@@ -163,7 +167,7 @@ def recorded_inputs(automaton: Automaton) -> dict[str, Ref]:
 
 
 def run_inputs(automaton: Automaton) -> list[str]:
-    """Return the names of the inputs of an automaton that its model has too."""
+    """Return the names of the inputs of an automaton that its model has too, in its order."""
     assert automaton.model
     return [name for name in automaton.inputs if name in automaton.model.inputs]
 
@@ -171,19 +175,28 @@ def run_inputs(automaton: Automaton) -> list[str]:
 def recorded_input_ref(
     automaton: Automaton, name: str, group: Literal["past", "after"] = "past"
 ) -> Ref:
-    """Return the variable of a recorded input at the examined tick (`past`) or the one after it."""
+    """Return the variable `work.<group>_<name>` of a recorded input.
+
+    `past` is the examined tick, `after` the one after it. Raises KeyError for another input.
+    """
     return Ref(f"work.{group}_{name}", recorded_inputs(automaton)[name].is_integer)
 
 
 def set_history_index(automaton: Automaton, ticks_back: Expr) -> Block:
-    """Return the operations that set the read index to `ticks_back` ticks before the newest one."""
+    """Return the operations that set the read index to `ticks_back` ticks before the newest one.
+
+    The index wraps once around the ring buffer, so `ticks_back` must be less than its size.
+    """
     wrap = Assign(HISTORY_INDEX.name, add(HISTORY_INDEX, integer(_history_size(automaton))))
     move = Assign(HISTORY_INDEX.name, subtract(NEWEST_INDEX, ticks_back))
     return (move, Branch(Compare("<", HISTORY_INDEX, integer(0)), (wrap,)))
 
 
 def load_recorded_states(automaton: Automaton, group: Literal["at", "after"]) -> list[Op]:
-    """Return the operations that copy the states at the read index to `work.<group>_<name>`."""
+    """Return the operations that copy the recorded states at the read index to work variables.
+
+    The variables are `work.<group>_<name>` for all states of the model.
+    """
     return [
         Assign(f"work.{group}_{name}", Item(f"memory.past_{name}", HISTORY_INDEX))
         for name in rolled_back_states(automaton)
@@ -191,13 +204,20 @@ def load_recorded_states(automaton: Automaton, group: Literal["at", "after"]) ->
 
 
 def load_current_states(automaton: Automaton, group: Literal["at", "after"]) -> list[Op]:
-    """Return the operations that copy the present states to `work.<group>_<name>`."""
+    """Return the operations that copy the present states to `work.<group>_<name>`.
+
+    The states are all those of the model.
+    """
     names = rolled_back_states(automaton)
     return [Assign(f"work.{group}_{name}", Ref(f"state.{name}")) for name in names]
 
 
 def load_recorded_inputs(automaton: Automaton, group: Literal["past", "after"]) -> list[Op]:
-    """Return the operations that copy the inputs at the read index to `work.<group>_<name>`."""
+    """Return the operations that copy the recorded inputs at the read index to work variables.
+
+    The inputs are those of `recorded_inputs`, the variables `work.<group>_<name>`: `past` for the
+    examined tick, `after` for the one after it.
+    """
     return [
         Assign(
             recorded_input_ref(automaton, name, group).name,
@@ -208,13 +228,20 @@ def load_recorded_inputs(automaton: Automaton, group: Literal["past", "after"]) 
 
 
 def load_current_inputs(automaton: Automaton, group: Literal["past", "after"]) -> list[Op]:
-    """Return the operations that copy the present inputs to `work.<group>_<name>`."""
+    """Return the operations that copy the present values of the recorded inputs to work variables.
+
+    The inputs are those of `recorded_inputs`, the variables `work.<group>_<name>`: `past` for the
+    examined tick, `after` for the one after it.
+    """
     recorded = recorded_inputs(automaton).items()
     return [Assign(recorded_input_ref(automaton, name, group).name, ref) for name, ref in recorded]
 
 
 def load_recorded_run_inputs(automaton: Automaton) -> list[Op]:
-    """Return the operations that copy the inputs of a run at the read index to `before.<name>`."""
+    """Return the operations that copy inputs at the read index to `before.<name>`.
+
+    The inputs are those of `run_inputs`, which the model has too.
+    """
     recorded = recorded_inputs(automaton)
     items = {
         n: Item(f"memory.past_{n}", HISTORY_INDEX, recorded[n].is_integer)
@@ -224,7 +251,11 @@ def load_recorded_run_inputs(automaton: Automaton) -> list[Op]:
 
 
 def tick_history_variables(automaton: Automaton) -> list[Variable]:
-    """Return the variables of the history and of values read from it; none without a rollback."""
+    """Return the variables of the history and of values read from it; none without a rollback.
+
+    Each state and each recorded input has a ring buffer `memory.past_<name>` of the longest
+    `within` in ticks.
+    """
     if not rollbacks_of(automaton):
         return []
     size = _history_size(automaton)

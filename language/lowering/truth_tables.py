@@ -18,7 +18,11 @@ STAGE_NAME = "decided"
 
 
 def truth_table_block(automaton: Automaton, known: NameBindings) -> Block:
-    """Return the block `decide` of all truth tables; empty if there is none."""
+    """Return the block `evaluate_tables` of all truth tables; empty if there is none.
+
+    First all conditions are evaluated, then the matching row of each table, then all results are
+    stored. `known` has the names with equations.
+    """
     conditions: list[Op] = []
     rows: list[Op] = []
     for table in automaton.tables:
@@ -37,14 +41,18 @@ def truth_table_block(automaton: Automaton, known: NameBindings) -> Block:
 
 
 def has_table_dependent_equations(automaton: Automaton) -> bool:
-    """Return whether an equation reads a variable that a truth table assigns."""
+    """Return whether an equation of a mode directly reads a variable that a truth table assigns."""
     written = {name for table in automaton.tables for name in table.assigned_names}
     formulas = [formula for mode in automaton.all_modes for formula in mode.equations.values()]
     return not written.isdisjoint(names_read(formula.tree for formula in formulas))
 
 
 def truth_table_variables(automaton: Automaton) -> list[Variable]:
-    """Return the `work` variables of the conditions and of the results of the tables."""
+    """Return the `work` variables of the tables, table by table.
+
+    They are `work.decision_<k>_<condition>` of table k, from 1, and `work.decided_<name>` of each
+    variable that it assigns.
+    """
     found: list[Variable] = []
     for table in automaton.tables:
         found += [

@@ -25,7 +25,8 @@ MAX_WAIT_TICKS = MAX_TIMER_TICKS - 1
 def tunable_wait(automaton: Automaton, wait: Formula | None) -> str | None:
     """Return the name of the tunable parameter that is the wait of a transition.
 
-    The result is None for a wait that is absent or fixed, and in a continuous automaton.
+    The wait has to be the name alone. The result is None for a wait that is absent or fixed, and in
+    a continuous automaton.
     """
     if wait is None or not automaton.period or not isinstance(wait.tree, Name):
         return None
@@ -41,7 +42,7 @@ def tunable_waits(automaton: Automaton) -> frozenset[str]:
 
 
 def seconds_to_ticks(automaton: Automaton, time: Fraction) -> int:
-    """Return ceil(time / period): a time [s] in ticks, computed exactly."""
+    """Return ceil(time / period): a time [s] in ticks of a sampled automaton, computed exactly."""
     assert automaton.period
     return math.ceil(time / automaton.period)
 
@@ -49,8 +50,8 @@ def seconds_to_ticks(automaton: Automaton, time: Fraction) -> int:
 def wait_range_in_ticks(automaton: Automaton, parameter: Parameter) -> Range:
     """Return the smallest and the largest whole number of ticks in the range of a tunable wait.
 
-    Without a declared range it is (0, MAX_WAIT_TICKS). The first exceeds the second if no whole
-    tick lies in the range.
+    The ends are the lower bound rounded up and the upper one rounded down. Without a declared range
+    it is (0, MAX_WAIT_TICKS). The first exceeds the second if no whole tick lies in the range.
     """
     if parameter.range is None:
         return Fraction(0), Fraction(MAX_WAIT_TICKS)
@@ -60,10 +61,11 @@ def wait_range_in_ticks(automaton: Automaton, parameter: Parameter) -> Range:
 
 
 def check_tunable_waits(automaton: Automaton, problems: Problems) -> None:
-    """Report each tunable wait that another formula reads too, or whose range is not usable.
+    """Report each tunable wait that cannot be stored as a count of ticks.
 
-    A range is usable if it lies within 0 to MAX_WAIT_TICKS, holds a whole tick, and holds the
-    value.
+    These are waits that are parameters of the model, that another formula reads too, or whose range
+    is not usable. A range is usable if it lies within 0 to MAX_WAIT_TICKS, holds a whole tick, and
+    holds the value rounded up to ticks. Nothing is raised.
     """
     waits = tunable_waits(automaton)
     if not waits:
