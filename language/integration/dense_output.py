@@ -47,9 +47,10 @@ class DenseOutput:
     constant_states: frozenset[str]
 
     def evaluate(self, states: Sequence[str]) -> Block:
-        """Return the operations that set `work.at_<state>` at `work.s`.
+        """Return the operations that set `work.at_<state>` of some states at `work.s`.
 
-        Constant states come first and get their present value.
+        Constant states come first and get their present value; the others get that of their
+        polynomial.
         """
         still = [name for name in states if name in self.constant_states]
         ops = [Assign(f"work.at_{name}", Ref(f"state.{name}")) for name in still]
@@ -95,8 +96,10 @@ def event_search_block(
         point; guards    ->    states of the condition; if condition: other states; guards
                                else: guards = false
 
-    `flows` are the blocks of the field. The condition is that of `_necessary_condition`; without
-    one the first form is used.
+    The condition reads states and constants only, and is true whenever a guard is: it has one part
+    of each guard, that with the fewest states. The first form is used without such a condition, or
+    if it reads all states that the guards read. `flows` are the blocks of the field. States that
+    neither the guards nor their equations read are not evaluated.
     """
     guards = f"guards_{mode.name}"
     read = _names_used(guards, flows)

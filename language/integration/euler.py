@@ -20,7 +20,10 @@ TERMS = 1
 
 
 def euler_method(field: VectorField) -> IntegrationMethod:
-    """Return the Euler method for a field; in each mode only states with a rate are integrated."""
+    """Return the Euler method for a field; in each mode only states with a rate are integrated.
+
+    The blocks are `step_<mode>` and `series_<mode>`; there are no constants and no variables.
+    """
     blocks: dict[str, Block] = {}
     for mode in field.automaton.modes:
         names = varying_states(field.automaton, mode)

@@ -57,9 +57,10 @@ def build_method(
 ) -> tuple[IntegrationMethod, IntegrationInfo]:
     """Return the integration method `name` for a field, and its description for reports.
 
-    `blocks` are those of the field and `step_size` is in s. Reported are a step above the stability
-    limit of a mode, too many tunable parameters, and `exact` with an input that varies inside a
-    step.
+    `blocks` are those of the field and `step_size` is in s. Reported as errors at `span` are a step
+    above the stability limit of a mode, `exact` with an input that varies inside a step, and, for
+    exponential methods, more than MAX_CORNER_PARAMETERS tunable parameters (the first ones are
+    used) and what the method itself reports. Raises KeyError for an unknown name.
     """
     step = float(step_size)
     number = point.automaton.numbers

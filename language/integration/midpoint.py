@@ -38,7 +38,11 @@ TERMS = 2
 
 
 def midpoint_method(field: VectorField) -> IntegrationMethod:
-    """Return the midpoint method for a field; only states with a rate in a mode are integrated."""
+    """Return the midpoint method for a field; only states with a rate in a mode are integrated.
+
+    The blocks are `step_<mode>` and `series_<mode>`. Each state has the variables
+    `work.first_<state>` and `work.middle_<state>` of its rates; there are no constants.
+    """
     blocks: dict[str, Block] = {}
     for mode in field.automaton.modes:
         quadratics = _quadratic_series(varying_states(field.automaton, mode))

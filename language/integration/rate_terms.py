@@ -29,7 +29,11 @@ class RateTerm:
 
 
 def source_text(tree: SyntaxTree) -> str:
-    """Return the text of an expression in its file, extended until its brackets balance."""
+    """Return the text of an expression in its line of the file.
+
+    It is extended to the right for missing `)`, then to the left for missing `(`, until the
+    parentheses balance or the line ends.
+    """
     span = tree.span
     line = span.source.lines[span.line - 1]
     start, end = span.column - 1, span.column - 1 + span.width
@@ -41,9 +45,11 @@ def source_text(tree: SyntaxTree) -> str:
 
 
 def rate_terms_of(mode: Mode, state: str) -> list[RateTerm]:
-    """Return the summands of a state's balance with all equations inlined.
+    """Return the summands of a state's balance, each also with all equations inlined.
 
-    SpecError if an inlined equation is too large.
+    They are those of the right side, from left to right, without their signs; an equation that is a
+    summand is split too. Raises SpecError if an inlined equation is too large, and KeyError if the
+    mode has no balance of the state.
     """
     known = inline_equations(mode, {})
     return [RateTerm(tree, substitute_names(tree, known)) for tree in _summands(mode, state)]
@@ -70,8 +76,10 @@ def _summands(mode: Mode, state: str) -> Iterator[SyntaxTree]:
 def non_affine_terms(automaton: Automaton, mode: Mode, point: LinearisationPoint) -> list[str]:
     """Return the source texts of the terms that are not affine in the states, without repetitions.
 
-    A term is affine if its derivative by each state depends on parameters only. A state whose
-    balance a parallel region chooses gives the text `der(<state>)`.
+    A term is affine if it reads only parameters, inputs and states, and its derivative by each
+    state exists and reads parameters only; `point` selects branches of derivatives. A state whose
+    balance is in a parallel region gives the text `der(<state>)`. Raises SpecError if an inlined
+    equation is too large.
     """
     found: dict[str, None] = {}
     for state in automaton.states:
@@ -89,8 +97,10 @@ def steepest_term(
 ) -> str:
     """Return the source text of the term of `row`'s rate with the largest slope in `column`.
 
+    Both are states; the slope counts by its magnitude, and of equal ones the first term is taken.
     `parts` are the affine forms of the names that the rates read. The text is empty if the mode has
-    no balance of the state, if its equations are too large, or if no term has a constant slope.
+    no balance of the state, if its equations are too large, or if no term has a constant slope
+    other than 0.
     """
     if row not in mode.flow or exceeds_inlining_limit(mode):
         return ""

@@ -43,8 +43,10 @@ def rk4_method(field: VectorField) -> IntegrationMethod:
     """Return the Runge-Kutta method for a field.
 
     In each mode only states with a rate are integrated. If `has_stage_blocks` is set, the
-    operations that all modes share are blocks of their own: an ECU that computes floating point in
-    software then has the values of one stage on its stack instead of all.
+    operations that all modes share are the blocks `stage_<k>` and `cubic`: an ECU that computes
+    floating point in software then has the values of one stage on its stack instead of all. There
+    are no constants; each state has the variables `work.k1_<state>` to `work.k4_<state>` and
+    `work.slope_<state>`.
     """
     alike = ever_varying_states(field.automaton)
     blocks: dict[str, Block] = {}

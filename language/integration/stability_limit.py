@@ -55,8 +55,11 @@ def stability_limit_of(
 ) -> StabilityLimit | None:
     """Return the stability limit of a mode from the affine forms of its rates.
 
-    States that are not coupled in a cycle are treated in separate groups. The result is None for an
-    exponential method, for rates that are not finite and if no component decays.
+    It is the smallest limit over all decaying eigenvalues (damping ratio above MIN_DAMPING_RATIO)
+    of the Jacobian, with the term and the state that dominate this eigenvalue. States that are not
+    coupled in a cycle are treated in separate groups; a group of more than MAX_COUPLED_STATES is
+    skipped. The result is None for an exponential method, for rates that are not finite and if no
+    component decays.
     """
     if method not in STABILITY_FUNCTIONS:
         return None
@@ -81,7 +84,11 @@ def stability_limit_of(
 
 
 def largest_stable_step(method: str, eigenvalue: complex) -> float:
-    """Return the largest h [s] with |R(h' lambda)| <= 1 for all h' from 0 to h."""
+    """Return the largest h [s] with |R(h' lambda)| <= 1 for all h' from 0 to h.
+
+    R is that of `STABILITY_FUNCTIONS`; `eigenvalue` is lambda [1/s], not 0. |h lambda| is searched
+    in steps of RAY_STEP up to MAX_RADIUS and then bisected.
+    """
     size = abs(eigenvalue)
     turn = eigenvalue / size
     return _stability_radius(method, complex(turn.real, abs(turn.imag))) / size
@@ -109,7 +116,11 @@ def _stability_radius(method: str, direction: complex) -> float:
 def check_stability(
     limit: StabilityLimit, method: str, h: float, span: Span, problems: Problems
 ) -> None:
-    """Report a problem if the step h [s] exceeds the stability limit."""
+    """Report an error at `span` if the step h [s] exceeds the stability limit.
+
+    The limit has a relative tolerance of GROWTH_TOLERANCE. The help names the term and the state
+    that set it, and how many times as many steps are enough.
+    """
     if h <= limit.step * (1.0 + GROWTH_TOLERANCE):
         return
     label = f"`{method}` is not stable in mode `{limit.mode}` with a step of {h:.4g} s: "

@@ -12,7 +12,7 @@ from language.numerics.matrix import Matrix, abs_sum
 def scale_by_ranges(field: VectorField, a: Matrix, h: float) -> Matrix:
     """Return A h (n, n) with each state in units of the width of its range.
 
-    Every state needs a range; `h` is in s.
+    Entry i, j is a_ij h width_j / width_i; `h` is in s. Every state needs a range.
     """
     widths = []
     for state in field.automaton.states.values():
@@ -25,7 +25,10 @@ def scale_by_ranges(field: VectorField, a: Matrix, h: float) -> Matrix:
 
 
 def row_sum_norm(a: Matrix) -> float:
-    """Return the largest sum of absolute values of a row; NaN if an entry is NaN."""
+    """Return the largest sum of absolute values of a row.
+
+    The result is NaN if an entry is NaN, and 0 without rows.
+    """
     return max_or_nan(abs_sum(row) for row in a)
 
 
@@ -38,7 +41,7 @@ def max_or_nan(values: Iterable[float]) -> float:
 
 
 def taylor_term_count(step: Matrix, number: NumberType = "float64") -> int:
-    """Return the number of terms after which no term of a Taylor sum matters, for z = A h (n, n).
+    """Return the number of terms, at least 1, of a Taylor sum of z = A h (n, n).
 
     The sum is that of z^k (d0 h) / (k + 1)!, and |d0 h| is at most |z|. From the K-th term on, |
     |z|^K 1 | |z| / (K + 1)! <= 2^-53, or 2^-24 in float32. Powers of the matrix of absolute values

@@ -87,18 +87,22 @@ class VectorField:
 
     @property
     def guard_slots(self) -> tuple[str, ...]:
-        """The suffixes of the guard variables of all regions."""
+        """The suffixes of the guard variables of all regions, those of the chart first."""
         return tuple(all_guard_slots(self.automaton))
 
     def mode_variable_of(self, region: str) -> str:
-        """Return the variable that holds the mode of a region."""
+        """Return the variable that holds the mode of a region.
+
+        It is derived from `mode_variable_name`, which is that of the chart.
+        """
         return mode_variable(self.mode_variable_name, region)
 
 
 def field_blocks(field: VectorField) -> dict[str, Block]:
-    """Return the blocks `rates_<mode>` and `guards_<mode>` of each mode.
+    """Return the blocks `rates_<mode>` and `guards_<mode>` of each mode of the chart.
 
-    A mode of a parallel region has a `guards_<region>_<mode>` block only.
+    A mode of a parallel region has a `guards_<region>_<mode>` block only; its balances are in the
+    rates of the modes of the chart. Each block evaluates the equations that it reads first.
     """
     blocks: dict[str, Block] = {}
     for region in field.automaton.regions:
@@ -113,7 +117,11 @@ def field_blocks(field: VectorField) -> dict[str, Block]:
 
 
 def field_variables(field: VectorField) -> list[Variable]:
-    """Return the `work` variables of the blocks of a vector field."""
+    """Return the `work` variables of the blocks of a vector field.
+
+    They are `work.at_<state>` and `work.rate_<state>` of each state, `work.at_<name>` of each
+    equation, `work.guard_<slot>` of each guard slot, and those of actions (`action_variables`).
+    """
     found = []
     for state, thing in field.automaton.states.items():
         dimension = thing.unit.dimension
@@ -130,7 +138,11 @@ def field_variables(field: VectorField) -> list[Variable]:
 
 
 def bindings_at_point(field: VectorField) -> dict[str, Expr]:
-    """Return a new dict of the expressions of names at the point, without equations."""
+    """Return a new dict of the expressions of names at the point, without equations.
+
+    States are `work.at_<state>`; inputs and constants are those of the field; conditions on modes
+    are included.
+    """
     return dict(_bindings_at_point(field))
 
 
@@ -146,19 +158,25 @@ def _bindings_at_point(field: VectorField) -> dict[str, Expr]:
 
 @cache_on_owner
 def all_bindings_at_point(field: VectorField) -> dict[str, Expr]:
-    """Return the expressions of names at the point, equations included."""
+    """Return the expressions of names at the point, equations of all modes included.
+
+    An equation is `work.at_<name>`. The dict is cached by field and not to be changed.
+    """
     known = bindings_at_point(field)
     known.update(equation_bindings(field.automaton, "work.at_"))
     return known
 
 
 def set_point_to_state(field: VectorField) -> list[Op]:
-    """Return the assignments that set the point to the present states."""
+    """Return the assignments `work.at_<state> = state.<state>` of all states."""
     return [Assign(f"work.at_{name}", Ref(f"state.{name}")) for name in field.states]
 
 
 def set_point_time(field: VectorField, time: Expr) -> list[Op]:
-    """Return the assignment of a time since the start of the step [s]; none if nothing reads it."""
+    """Return the assignment of a time since the start of the step [s] to `work.s`.
+
+    The list is empty if the field does not depend on time.
+    """
     return [Assign("work.s", time)] if field.is_time_dependent else []
 
 
@@ -176,8 +194,9 @@ def any_guard_condition(
 ) -> Expr:
     """Return the condition that a guard of a mode is true, or has changed if `armed` is given.
 
-    `armed` maps guard slots to the variables of their earlier truth. A level of an edge that has
-    changed counts as well.
+    The guards are those of the mode and its parallel regions; without any it starts from false.
+    `armed` maps guard slots to the variables of their earlier truth. A change of the level of any
+    edge of the automaton counts as well, in both cases.
     """
     result: Expr = Value(False)
     for k, watched in enumerate(guard_slots(mode)):
@@ -195,7 +214,9 @@ def select_by_priority(
 ) -> Block:
     """Return the operations of the enabled transition with the smallest priority (rule 3a).
 
-    `enabled` and `effects` map the index of a transition to its condition and its operations.
+    `enabled` and `effects` map the index of a transition in the mode to its condition and its
+    operations. A transition with the condition `ALWAYS` is taken without a test, and those after it
+    are left out. If none is enabled, nothing happens.
     """
     ops: Block = ()
     for k, _ in reversed(transitions_by_priority(mode)):
@@ -204,7 +225,10 @@ def select_by_priority(
 
 
 def lower_reset_stages(field: VectorField, transition: Transition) -> tuple[list[Op], list[Op]]:
-    """Return the two halves of a transition's reset: evaluation, then storage (rule 5)."""
+    """Return the two halves of a transition's reset: evaluation, then storage (rule 5).
+
+    The values are evaluated at the point, equations included. Both lists are empty without a reset.
+    """
     automaton, known = field.automaton, all_bindings_at_point(field)
     return read_stage(automaton, transition.reset, known), commit_stage(automaton, transition.reset)
 
@@ -214,7 +238,9 @@ def lower_single_region_step(
 ) -> Block:
     """Return one micro-step of an automaton without parallel regions.
 
-    `extra_effects` are operations to append to those of a transition, by its index.
+    The enabled transition with the smallest priority runs its actions, sets the mode and then runs
+    its operations of `extra_effects`. `enabled` and `extra_effects` have the index of a transition
+    in the mode as key; transitions may be absent from `extra_effects`.
     """
     fire = {
         k: (
@@ -230,7 +256,9 @@ def lower_single_region_step(
 def lower_transition_actions(field: VectorField, transition: Transition) -> list[Op]:
     """Return exit, reset and entry of a transition if no parallel region fires with it (rule 6).
 
-    A reset of one state without exit and entry is stored without a `work` variable.
+    The order is exit, reset, entry; each stage reads the values after the one before. The mode
+    variable is not set. A reset of one variable without exit and entry is stored without a `work`
+    variable.
     """
     source, target = (
         field.automaton.source_mode(transition),
@@ -255,7 +283,8 @@ def lower_entry_at_point(
 ) -> list[Op]:
     """Return the entry actions of `target` after the reset; none without assignments.
 
-    The point is set to the states, and the equations that the entry reads are evaluated.
+    First the point is set to the states and the equations of `target` that the entry reads are
+    evaluated.
     """
     if not assignments:
         return []
