@@ -59,7 +59,12 @@ class PredictionMatrices:
 
 
 def covariance_variables(automaton: Automaton) -> list[Variable]:
-    """Return the variables of the recursive observers of an automaton."""
+    """Return the variables of the recursive observers of an automaton, each once.
+
+    They are the covariances of the upper triangle (`memory.P_<row>__<column>`), the products
+    `work.t_<row>__<column>`, `work.pc_`, `work.gain_` and `work.density_` of each state,
+    `work.spread` and `work.residual`. Without a recursive observer the list is empty.
+    """
     found: dict[str, Variable] = {}
     for mode in automaton.modes.values():
         observer = mode.observer
@@ -83,19 +88,25 @@ def covariance_variables(automaton: Automaton) -> list[Variable]:
 
 
 def covariance_entry(row: str, column: str) -> str:
-    """Return the variable of a covariance; `row` must not come after `column` among the states."""
+    """Return the variable `memory.P_<row>__<column>` of a covariance.
+
+    `row` must not come after `column` in the order of the states.
+    """
     return f"memory.P_{row}__{column}"
 
 
 def state_pairs(states: StateNames) -> Iterator[tuple[str, str]]:
-    """Yield the pairs (row, column) of the upper triangle, whose covariances are stored."""
+    """Yield the pairs (row, column) of the upper triangle, diagonal included, row by row."""
     for i, row in enumerate(states):
         for column in states[i:]:
             yield row, column
 
 
 def covariance_rows_block(solved: SolvedNames, prediction: PredictionMatrices) -> Block:
-    """Return the operations T = Phi P, the first half of P = Phi P Phi' + Qd."""
+    """Return the operations T = Phi P, the first half of P = Phi P Phi' + Qd.
+
+    T is `work.t_<row>__<column>`; products with zero entries of Phi are left out.
+    """
     states, phi = solved.observer.states, prediction.matrices["Phi"]
     ops: list[Op] = []
     for row in states:
@@ -107,7 +118,10 @@ def covariance_rows_block(solved: SolvedNames, prediction: PredictionMatrices) -
 
 
 def covariance_columns_block(solved: SolvedNames, prediction: PredictionMatrices) -> Block:
-    """Return the operations P = T Phi' + Qd, with `work.density_<state>` for varying densities."""
+    """Return the operations P = T Phi' + Qd for the upper triangle of P.
+
+    Qd is that of constant densities plus N_<state> times `work.density_<state>` for varying ones.
+    """
     states, phi = solved.observer.states, prediction.matrices["Phi"]
     ops: list[Op] = []
     for row, column in state_pairs(states):
@@ -123,9 +137,9 @@ def correct_by_measurement(
 ) -> Block:
     """Return the operations that correct states and P by one measurement.
 
-    `residual` is the measured minus the expected value, `c` is C (measures, states). The innovation
-    variance is s = max(c P c' + r, r), since rounding may bring the sum below r; k = P c'/s; x + k
-    residual; P - k c P (Bierman 1977, section II.6).
+    `residual` is the measured minus the expected value, `c` is C (measures, states), `measure` the
+    row. The innovation variance is s = max(c P c' + r, r), since rounding may bring the sum below
+    r; k = P c'/s; x + k residual, saturated; P - k c P (Bierman 1977, section II.6).
     """
     states = solved.observer.states
     variance = Ref(f"solved.{solved.mode}_R.{measure}")
@@ -150,9 +164,10 @@ def correct_by_measurement(
 def covariance_limit_blocks(
     automaton: Automaton, mode: Mode, values: Mapping[str, Scalar], problems: Problems
 ) -> dict[str, Block]:
-    """Return the block that limits P at the end of a tick; empty if the observer has no limits.
+    """Return the block `bound_<mode>` that limits P at the end of a tick, by its name.
 
-    Modes with the same limits share one block, named after the first of them.
+    The dict is empty if the observer has no limits. Modes with the same limits share one block,
+    named after the first of them. Wrong limits are reported (`variance_limits`).
     """
     observer = mode.observer
     assert observer
@@ -179,7 +194,8 @@ def variance_limits(
 ) -> dict[str, tuple[float, float]]:
     """Return the variance limits (low, high) of an observer, by state.
 
-    A limit that reads a tunable parameter, or a pair without 0 <= low < high, is reported.
+    A limit that reads a tunable parameter, or a pair without 0 <= low < high, is reported and still
+    returned. Raises SpecError for a limit that is not made of parameters or not finite.
     """
     found = {}
     for name, pair in observer.variance_limits.items():
@@ -195,9 +211,10 @@ def variance_limits(
 
 
 def limit_covariance(states: StateNames, limits: Mapping[str, tuple[float, float]]) -> Block:
-    """Return the operations that clip variances to their limits and set a fault bit if they do.
+    """Return the operations that clip P to its limits and set the fault bit `covariance_range`.
 
-    A covariance is clipped to +-sqrt(high_i high_j). States without limits are left out.
+    A variance is clipped to (low, high), a covariance to +-sqrt(high_i high_j); the bit is set only
+    if a value is outside. States without limits are left out.
     """
     ops: list[Op] = []
     for row, column in state_pairs(states):

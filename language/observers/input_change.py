@@ -43,7 +43,7 @@ CHANGE_VARIABLE = "work.change_{}"
 
 
 def input_change_variables(automaton: Automaton) -> list[Variable]:
-    """Return the variables of the inputs that change at unknown instants, each once."""
+    """Return `work.change_<input>` for each input that changes at an unknown instant, each once."""
     modes = automaton.modes.values()
     observed = [mode.observer for mode in modes if mode.observer]
     named = dict.fromkeys(name for observer in observed for name in observer.unknown_instant)
@@ -63,8 +63,9 @@ def input_change_matrices(
 ) -> dict[str, Matrix]:
     """Return M_<input> (n, 1) and V_<input> (n, n), the moments of the effect of a change by 1.
 
-    M is the mean and V the covariance. An input without an entry in B, or with a time that is not
-    positive, is reported and left out.
+    M is the mean and V the covariance over an instant that is uniform in the time of the input. An
+    input without an entry in B, or with a time that is not positive, is reported and left out.
+    Raises SpecError if a formula reads anything but parameters or is not finite.
     """
     states, found = observer.states, {}
     a = numeric_matrix(automaton, values, observer.a, states, states, "A")
@@ -84,7 +85,8 @@ def input_change_matrices(
 def change_moments(a: Matrix, b: Matrix, time: float) -> tuple[Matrix, Matrix]:
     """Return mean (n, 1) and covariance (n, n) of g(s) with s uniform in [0, time].
 
-    dg/ds = A g + b, g(0) = 0. A (n, n) [unit_i/(unit_j s)], b (n, 1) [unit_i/(unit_u s)], time [s].
+    dg/ds = A g + b, g(0) = 0. A (n, n) [unit_i/(unit_j s)], b (n, 1) [unit_i/(unit_u s)], time [s]
+    > 0.
     """
     n = len(a)
     flow = (*((*a[i], b[i][0]) for i in range(n)), (0.0,) * (n + 1))
@@ -106,7 +108,10 @@ def correct_input_change(
 ) -> tuple[Block, tuple[Constant, ...]]:
     """Return the operations that correct states and P for changed inputs, and their constants.
 
-    `known` are the bindings of the previous and of the present tick.
+    For each input of `unknown_instant` they set `work.change_<input>` to present minus previous
+    value and, if it is not 0, add M times the change to the states and V times its square to P.
+    `known` are the bindings of the previous and of the present tick. Faulty inputs are reported and
+    left out (`input_change_matrices`).
     """
     numbers = input_change_matrices(automaton, values, solved.observer, problems)
     ops: list[Op] = []

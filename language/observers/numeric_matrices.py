@@ -21,8 +21,8 @@ def numeric_matrix(
 ) -> Matrix:
     """Return the matrix (rows, columns) of the values of formulas by row and column name.
 
-    A missing entry is 0. `what` names the matrix in messages. SpecError if a formula reads anything
-    but parameters or is not finite.
+    A missing entry is 0; entries of other rows and columns are ignored. `what` names the matrix in
+    messages. Raises SpecError if a formula reads anything but parameters or is not finite.
     """
 
     def value(row: str, column: str) -> float:
@@ -39,15 +39,20 @@ def numeric_diagonal(
     entries: Mapping[str, Formula],
     names: tuple[str, ...],
 ) -> Matrix:
-    """Return the diagonal matrix (names, names) of the values of formulas by name."""
+    """Return the diagonal matrix (names, names) of the values of formulas by name.
+
+    A missing entry is 0; formulas of other names are ignored. Raises SpecError if a formula reads
+    anything but parameters or is not finite.
+    """
     rows = {name: {name: formula} for name, formula in entries.items()}
     return numeric_matrix(automaton, values, rows, names, names, "noise")
 
 
 def output_matrix(automaton: Automaton, values: Mapping[str, Scalar], observer: Observer) -> Matrix:
-    """Return C (measures, states).
+    """Return C (measures, states) of an observer.
 
-    Without formulas, each row has a 1 at the state that it measures.
+    Without formulas, each row has a 1 at the state that it measures. Raises SpecError if a formula
+    reads anything but parameters or is not finite.
     """
     measures = tuple(observer.measures)
     if observer.c:

@@ -68,8 +68,9 @@ def lower_steady_observer(
 ) -> LoweredObserver | None:
     """Return the observer of a mode; None if its matrices cannot be computed, which is reported.
 
-    `before` are the bindings during the prediction: present states, inputs of the previous tick.
-    `now` are those during the correction. `values` are the values of the constants.
+    This includes a Riccati equation without a solution. `before` are the bindings during the
+    prediction: present states, inputs of the previous tick. `now` are those during the correction.
+    `values` are the values of the constants.
     """
     assert mode.observer and automaton.period is not None
     observer = derive_observer_matrices(automaton, mode.name, mode.observer, values, problems)
@@ -103,7 +104,11 @@ def lower_steady_observer(
 def offset_constants(
     automaton: Automaton, observer: Observer, values: Mapping[str, Scalar]
 ) -> tuple[Constant, ...]:
-    """Return the constant parts of f and g as solved constants."""
+    """Return the constant parts of f and g as constants `solved.<name>`.
+
+    The names are those of `observer.constants`. Raises SpecError if a part reads anything but
+    parameters or is not finite.
+    """
     return tuple(
         Constant(
             f"solved.{name}",
@@ -116,7 +121,11 @@ def offset_constants(
 
 
 def observer_variables(automaton: Automaton) -> list[Variable]:
-    """Return the variables that the observers of an automaton use."""
+    """Return the variables that the observers of an automaton use, each once.
+
+    Each state has `work.predicted_<state>` and `work.f_<state>`, each measured input
+    `innovation.<input>`.
+    """
     found: dict[str, Variable] = {}
     for mode in automaton.modes.values():
         if mode.observer is None:
@@ -174,11 +183,15 @@ class SolvedNames:
     observer: Observer
 
     def entry(self, letter: str, row: str, column: str) -> str:
-        """Return the name of an entry of a matrix."""
+        """Return the name of an entry of a matrix: `solved.<mode>_<letter>.<row>.<column>`."""
         return f"solved.{self.mode}_{letter}.{row}.{column}"
 
     def row_and_column_names(self, letter: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Return the names of the rows and of the columns of a matrix; other letters are (n, n)."""
+        """Return the names of the rows and of the columns of a matrix.
+
+        Gamma is (states, inputs), L (states, measures), C (measures, states); Phi, G and all other
+        letters are (states, states).
+        """
         states, measures = self.observer.states, tuple(self.observer.measures)
         return {
             "Phi": (states, states),
@@ -191,9 +204,10 @@ class SolvedNames:
     def nonzero_constants(
         self, matrices: Mapping[str, Matrix], depends_on: tuple[str, ...]
     ) -> tuple[Constant, ...]:
-        """Return the nonzero entries of matrices as solved constants.
+        """Return the nonzero entries of matrices as solved constants, row by row.
 
-        Columns of G without an offset f are left out.
+        Columns of G of states without an offset f are left out. `depends_on` are the tunable
+        parameters.
         """
         found = []
         for letter, matrix in matrices.items():
@@ -208,9 +222,10 @@ class SolvedNames:
     def row_products(
         self, letter: str, matrix: Matrix, row: str, values: Mapping[str, Expr]
     ) -> list[Expr]:
-        """Return the products of a row of a matrix with values by column.
+        """Return the products of a row of a matrix with values by column, without zero entries.
 
-        Zero entries and columns without a value are left out; a factor of 1 is not written.
+        Columns without a value are left out; a factor of 1 is not written. An empty matrix gives an
+        empty list.
         """
         rows, columns = self.row_and_column_names(letter)
         if not matrix:
@@ -237,7 +252,12 @@ def predict_mean(
     before: NameBindings,
     prefix: str,
 ) -> Block:
-    """Return the operations that predict the states over a period and store them."""
+    """Return the operations that predict the states over a period and store them, saturated.
+
+    x = Phi x + Gamma u + G f, with `matrices` by these letters. f is evaluated first as
+    `work.f_<state>`, with the names in `before`; all predictions are evaluated before the first one
+    is stored. `prefix` opens the key paths.
+    """
     state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in observer.states}
     held = {name: before[name] for name in observer.inputs}
     ops: list[Op] = []
@@ -289,7 +309,7 @@ def _correct_mean(
 def has_new_measurement(observer: Observer, measure: str) -> Expr:
     """Return the condition that a tick has a new value of a measurement to correct with.
 
-    It includes the input `correct` of the observer, if that is declared.
+    It is `is_new.<measure>`, and the input `correct` of the observer if that is declared.
     """
     fresh = Ref(f"is_new.{measure}")
     if observer.correct is None:
@@ -298,7 +318,11 @@ def has_new_measurement(observer: Observer, measure: str) -> Expr:
 
 
 def solved_formulas(observer: Observer) -> list[Formula]:
-    """Return the formulas that the solved numbers of an observer depend on."""
+    """Return the formulas that the solved numbers of an observer depend on.
+
+    They are the entries of A, B and C, then process noise, measurement noise and unknown instants;
+    f and g are not included.
+    """
     rows = [*observer.a.values(), *observer.b.values(), *observer.c.values()]
     noise = [observer.process_noise, observer.measurement_noise, observer.unknown_instant]
     return [formula for row in [*rows, *noise] for formula in row.values()]
