@@ -23,7 +23,9 @@ def lower_entry_set(
 ) -> Block:
     """Return the operations that activate the entry set of a transition after its exits.
 
-    The regions inside the domain become inactive first. An internal transition has no operations.
+    First all regions inside the domain become inactive, then the nodes are activated from the
+    outside in: mode variable, timers, run and entry flag. Entry actions are not included. An
+    internal transition, which has no domain, has no operations.
     """
     if chart_transition.domain is None:
         return ()

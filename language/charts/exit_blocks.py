@@ -12,8 +12,9 @@ from language.model.statechart import ChartNode
 def exit_blocks(context: ChartContext) -> dict[str, Block]:
     """Return the blocks `leave_<node>` and `quit_<region>`, by name.
 
-    `leave_<node>` leaves the active nodes inside a node that some transition leaves;
-    `quit_<region>` leaves a nested region with its active nodes.
+    `leave_<node>` leaves the active nodes inside a node that is the domain of some transition, but
+    not the node itself; `quit_<region>` leaves a nested region with its active nodes. Leaving
+    stores histories, sets exit flags, and clears timers and edges; exit actions are not included.
     """
     chart = context.chart
     blocks: dict[str, Block] = {}
@@ -29,7 +30,7 @@ def exit_blocks(context: ChartContext) -> dict[str, Block]:
 
 
 def run_exit_block(node: ChartNode) -> RunBlock:
-    """Return the operation that leaves the active nodes inside a node."""
+    """Return the operation that runs `leave_<node>`: the active nodes inside a node are left."""
     return RunBlock(f"leave_{to_identifier(node.path)}")
 
 
