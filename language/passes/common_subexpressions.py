@@ -28,8 +28,10 @@ CHEAP_FUNCTIONS = ("real", "whole", "abs")
 def eliminate_common_subexpressions(program: Program) -> Program:
     """Return a Program whose blocks compute no real expression twice from the same values.
 
-    Expressions inside branches, loops and switches are left as they are. The new `work` variables
-    are named after their formula.
+    Named are arithmetic on reals and calls other than CHEAP_FUNCTIONS that occur twice or more in
+    the assignments and stores of one block, until a variable that they read is written. Expressions
+    inside branches, loops and switches are left as they are. The new `work` variables are named
+    after their formula; a name in use gets `_2`, `_3`, ...
     """
     writes = _transitive_writes(program)
     taken = {name.partition(".")[2].lower() for name in _all_names(program)}

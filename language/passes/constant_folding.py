@@ -50,7 +50,7 @@ LATCH_BLOCK = "latch"
 
 
 def run_passes(program: Program) -> Program:
-    """Return the Program after all passes in their order."""
+    """Return the Program after all passes of PASSES: parameters, inputs, program."""
     for run in PASSES.values():
         program = run(program)
     return program
@@ -59,11 +59,13 @@ def run_passes(program: Program) -> Program:
 def hoist_inputs(program: Program) -> Program:
     """Return a continuous Program whose expressions of inputs are computed in the block `latch`.
 
-    Only inputs and fixed constants are hoisted, since the calibration page may change between two
-    latches. A sampled Program is returned unchanged.
-
         x = before.u * k * state.y    ->    latch: before.u_k = before.u * k
                                             x = before.u_k * state.y
+
+    Only real operations on latched inputs and fixed constants are hoisted, since the calibration
+    page may change between two latches. An expression with a call other than CHEAP_FUNCTIONS is
+    recomputed only at the start and after a change of an input that it reads. EXCLUDED_BLOCKS are
+    unchanged. A sampled Program is returned unchanged.
     """
     if program.period is not None:
         return program
@@ -121,7 +123,9 @@ def fold_parameters(program: Program) -> Program:
         x = calibration.p * constant.q           ->    x = derived.p_q    (block `derive`)
         x = state.y / constant.p                 ->    x = state.y * constant.per_p
 
-    A value that is not finite is not folded, and a reciprocal below SMALLEST_NORMAL is not used.
+    Only real operations on real parameters that are no tables are folded, in all blocks but
+    EXCLUDED_BLOCKS. A value that is not finite is not folded, and a reciprocal below
+    SMALLEST_NORMAL or not finite is not used.
     """
     number = program.number_type
     values: dict[str, Scalar] = {c.name: c.value for c in program.constants if not c.items}
@@ -163,7 +167,10 @@ def fold_parameters(program: Program) -> Program:
 
 
 def eliminate_redundancy(program: Program) -> Program:
-    """Return a Program without common subexpressions and without unused fixed parameters."""
+    """Return a Program without common subexpressions and without unused fixed parameters.
+
+    Unused are constants `constant.<name>` that no block names; tunable and derived ones stay.
+    """
     return _remove_unused_constants(eliminate_common_subexpressions(program))
 
 
