@@ -37,9 +37,11 @@ def sampled_variables(
     delays: tuple[SampledDelay, ...],
     chart_variables: list[Variable],
 ) -> list[Variable]:
-    """Return the variables of a sampled automaton, each once.
+    """Return the variables of a sampled automaton, each once; the last of equal names wins.
 
-    `finalise_program` removes the unused ones.
+    They are those of inputs, new measurements, states, timers, observers, delays, edges, rollbacks,
+    regions, chart, actions, tables, ranges and invariants. `finalise_program` removes the unused
+    ones.
     """
     found = input_variables(automaton, "input")
     measured = [m.observer.measures for m in automaton.modes.values() if m.observer]
@@ -73,7 +75,8 @@ def sampled_variables(
 def base_bindings(automaton: Automaton, group: str) -> dict[str, Expr]:
     """Return the expressions of names without equations; `group` of inputs is `input` or `before`.
 
-    The modes of the model are those of the run.
+    They are parameters, inputs, states, discrete variables, conditions on modes and the guard of
+    fault transitions. Modes of the model have its name as prefix and are those of the run.
     """
     known = dict(constant_bindings(automaton))
     known.update(variable_bindings(automaton, group))
@@ -90,7 +93,7 @@ def base_bindings(automaton: Automaton, group: str) -> dict[str, Expr]:
 def current_bindings(automaton: Automaton) -> tuple[dict[str, Expr], dict[str, Expr]]:
     """Return the bindings of a tick with equations and without them, in this order.
 
-    Both contain the delayed values.
+    Both contain the delayed values; inputs are the present ones, equations `equation.<name>`.
     """
     names = equation_bindings(automaton, "equation.")
     everywhere = add_delay_bindings(
@@ -102,7 +105,10 @@ def current_bindings(automaton: Automaton) -> tuple[dict[str, Expr], dict[str, E
 def chart_context_of(
     automaton: Automaton, transitions: Iterable[TransitionInfo]
 ) -> ChartContext | None:
-    """Return the context of the lowering of the automaton's chart; None without nested modes."""
+    """Return the context of the lowering of the automaton's chart; None without nested modes.
+
+    `transitions` are the data of all its transitions.
+    """
     if automaton.statechart is None:
         return None
     infos = {info.key.partition(" ")[2]: info for info in transitions}

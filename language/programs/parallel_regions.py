@@ -44,6 +44,7 @@ class TransitionSelection:
 def parallel_blocks(field: VectorField, selection: TransitionSelection) -> dict[str, Block]:
     """Return `<prefix>_<region>_<mode>` of the parallel regions, and `commit_<prefix>`.
 
+    The former select a transition of a mode, the latter performs the selected ones of all regions.
     The prefix of the selection separates the blocks of a run from those of its automaton.
     """
     blocks: dict[str, Block] = {}
@@ -57,7 +58,11 @@ def parallel_blocks(field: VectorField, selection: TransitionSelection) -> dict[
 
 
 def lower_parallel_step(field: VectorField, mode: Mode, selection: TransitionSelection) -> Block:
-    """Return one micro-step of all regions while `mode` of the chart is active."""
+    """Return one micro-step of all regions while `mode` of the chart is active.
+
+    All selections are cleared; the mode and the active modes of its own parallel regions select;
+    then `commit_<prefix>` runs.
+    """
     regions = field.automaton.all_regions
     ops: list[Op] = [
         Assign(selection.selected_variable(region.name), integer(0)) for region in regions

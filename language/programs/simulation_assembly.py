@@ -80,12 +80,16 @@ class SimulationAssembly:
 
     @property
     def continuous_instances(self) -> tuple[str, ...]:
-        """The names of the continuous instances."""
+        """The names of the continuous instances, in the order of `programs`."""
         return tuple(name for name, program in self.programs.items() if program.period is None)
 
     @property
     def instant_actions(self) -> tuple[str, ...]:
-        """The actions at an instant, by bit: ticks, sensor samples, captures of delayed sensors."""
+        """The actions at an instant, by bit: ticks, sensor samples, captures of delayed sensors.
+
+        They are the names of sampled instances in `order`, then of all sensors, then `capture
+        <sensor>` of each sensor with a delay.
+        """
         ticks = [
             name
             for name in self.order
@@ -95,7 +99,7 @@ class SimulationAssembly:
         return (*ticks, *self.sensors, *late)
 
     def digest(self) -> str:
-        """Return the SHA-256 digest of everything that determines the printed code."""
+        """Return the SHA-256 digest (hexadecimal) of all that determines the printed code."""
         programs = [(name, digest(program)) for name, program in self.programs.items()]
         rest = (self.order, self.inputs, self.input_sources, self.row_signals, self.columns)
         more = (sorted(self.controlled), list(self.sensors.items()), digest(self.wires))
@@ -103,9 +107,9 @@ class SimulationAssembly:
         return hashlib.sha256(text.encode()).hexdigest()
 
     def tunables(self) -> Iterator[tuple[str, Constant]]:
-        """Yield the instance and the constant of each real tunable scalar.
+        """Yield the instance and the constant of each real tunable parameter that is no table.
 
-        Their order is that of the values of a variant.
+        Instances and constants are in the order of `programs` and of their Programs.
         """
         for name, program in self.programs.items():
             for constant in program.constants:
@@ -113,7 +117,7 @@ class SimulationAssembly:
                     yield name, constant
 
     def first_event_numbers(self) -> dict[str, int]:
-        """Return the number of the first event of each instance.
+        """Return the number of the first event of each instance, from 0 without gaps.
 
         The events of an instance are its transitions, then its ranges, then its invariants.
         """
@@ -139,5 +143,5 @@ def output_variables(program: Program) -> dict[str, str]:
 
 
 def input_name(source: InputSource) -> str:
-    """Return the name of the input that a source sets."""
+    """Return the name of the input that a source sets, without its group."""
     return unqualified_name(source.variable.name)

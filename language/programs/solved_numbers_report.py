@@ -13,10 +13,11 @@ MATRIX_COLUMNS = {"Phi": "states", "Gamma": "inputs", "L": "measures"}
 
 
 def format_solved_numbers(program: Program) -> str:
-    """Return the text of the report.
+    """Return the text of the report, which ends with a line feed.
 
-    It gives the method, |A h|, stability limits and the bound of work of a run or flow, the longest
-    tick, and the matrices of the observers.
+    It begins with `program <name>` and gives the method, |A h|, stability limits, the bound of work
+    of a run with events and of each rewind (all if the Program integrates), the longest tick in
+    operations (sampled Programs), and the matrices Phi, Gamma and L of the observers.
     """
     lines = [f"program {program.name}"]
     if program.integration:
@@ -33,7 +34,10 @@ def format_solved_numbers(program: Program) -> str:
 
 
 def format_method_lines(motion: IntegrationInfo) -> Iterator[str]:
-    """Yield lines for the method, |A h| of each mode and the largest stable step of each mode."""
+    """Yield a line for the method, then one for |A h| and one for the stability limit of each mode.
+
+    The first names method, step [s] and number of terms K. Modes without such a value have no line.
+    """
     yield f"method {motion.method}, step {motion.step:.6g} s, K = {motion.series_terms}"
     for mode, norm in motion.norms.items():
         yield f"  mode {mode}: |A h| = {norm:.4g}, at most 4"
