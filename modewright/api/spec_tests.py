@@ -25,7 +25,7 @@ from modewright.runtime.compiled_run import run_in_c
 class TestRun:
     """The result of a test: the outcomes on the engine, and the first difference to C.
 
-    `means` names what ran beside the engine, or is empty. A `difference` fails the test.
+    `backend` names what ran beside the engine, or is empty. A `difference` fails the test.
     """
 
     __test__ = False  # for pytest
