@@ -9,8 +9,9 @@ from pathlib import Path
 def distinguish_file_names(paths: Sequence[Path]) -> Mapping[Path, str]:
     """Return a display name for each path: the file name, with parent folders if names repeat.
 
-    All names have the same number of path components: the smallest one that makes all of them
-    different. Paths that denote the same file keep the full path.
+    All names have the same number of trailing path components, joined with `/`: the smallest number
+    that makes all of them different. If two paths are the same absolute path (links are not
+    resolved), all names are absolute paths.
     """
     absolute = {path: path.absolute().parts for path in paths}
     names: dict[Path, str] = {}

@@ -17,10 +17,10 @@ MAD_TO_STD = 1.4826
 def noise_of(values: Reals) -> float:
     """Return the standard deviation of the white noise in a signal (samples,); NaN is ignored.
 
-    The estimate is the 20 % quantile, over windows of 50 samples, of the median absolute second
-    difference, divided by the square root of 6 (second differences of white noise have 6 times its
-    variance). It is at least the standard deviation of the quantisation, quantum / sqrt(12), and 0
-    for fewer than 5 known values.
+    It is the `NOISE_QUANTILE` (20 %) quantile, over windows of at least `WINDOW_SAMPLES` (50)
+    second differences, of 1.4826 times their median magnitude, divided by the square root of 6
+    (second differences of white noise have 6 times its variance). It is at least the standard
+    deviation of the quantisation, `quantum_of` / sqrt(12), and 0 for fewer than 5 known values.
     """
     known = values[np.isfinite(values)]
     if len(known) < 5:
@@ -47,7 +47,8 @@ def _window_medians(sizes: Reals) -> Reals:
 def quantum_of(values: Reals) -> float:
     """Return the quantisation step of a signal: the smallest difference of distinct values.
 
-    Differences at rounding level are ignored; the result is 0 if all values are equal.
+    Differences up to 1e-9 times the largest magnitude (at least 1) are ignored; the result is 0 if
+    no difference is left. `values` must not contain NaN.
     """
     gaps = np.diff(np.unique(values))
     gaps = gaps[gaps > 1e-9 * max(1.0, float(np.max(np.abs(values), initial=0.0)))]

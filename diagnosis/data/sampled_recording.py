@@ -58,9 +58,7 @@ class SampledRecording:
 
     @cached_property
     def noise(self) -> tuple[Reals, Reals]:
-        """The noise standard deviations of the compared
-        outputs (outputs,) and the inputs (inputs,).
-        """
+        """The noise standard deviations by `noise_of`: (outputs,) and (inputs,)."""
         seen, inputs = (
             [noise_of(column) for column in values.T] for values in (self.measured, self.inputs)
         )
@@ -68,7 +66,10 @@ class SampledRecording:
 
 
 def compared_outputs(mapping: RecordingMap, automaton: Automaton) -> tuple[str, ...]:
-    """Return the outputs that a recording map compares, in the order of the automaton."""
+    """Return the outputs that a recording map compares, in the order of the automaton.
+
+    A `compare` in the map that is no output of the automaton is left out.
+    """
     mapped = {column.compare for column in mapping.columns.values() if column.compare}
     return tuple(name for name in automaton.outputs if name in mapped)
 
@@ -78,8 +79,9 @@ def sample_windows(
 ) -> tuple[SampledRecording, ...]:
     """Return one sampled recording for each window of a recording (one if it has no windows).
 
-    Inputs that are not recorded take the constant of the map, or else their declared default.
-    Raises ValueError if a window has too few samples.
+    The grid is that of `sample_recording`. Inputs without a channel have the constant of the map,
+    or else their declared default; KeyError if they have neither. Raises ValueError if a window has
+    too few samples.
     """
     constants = {name: float(value) for name, (value, _) in mapping.constants.items()}
     declared = {
@@ -104,9 +106,11 @@ def sample_recording(
     """Return a recording on the uniform grid of its fastest channel, or on a grid of `period` [s].
 
     The grid begins at the first time stamp of the fastest compared channel at which all channels
-    are known, and ends with the shortest channel. `defaults` gives the constant value of each input
-    without a channel. Raises ValueError if a channel has fewer than two values or the grid fewer
-    than two samples.
+    are known, and ends with the channel that ends first. The columns are `inputs` and
+    `output_names` in their order: an input without a channel is constant at its value in `defaults`
+    (KeyError without one), an output without a channel is NaN. Other channels are ignored. Raises
+    ValueError if a used channel has fewer than two values or the grid fewer than two samples. The
+    inputs are marked as held between samples, whatever the map says.
     """
     input_channels = {
         c.column.to: c for c in recording.channels.values() if c.column.to is not None
@@ -146,7 +150,11 @@ def sample_recording(
 
 
 def has_feedthrough(automaton: Automaton, output_names: Sequence[str]) -> bool:
-    """Return whether a compared output depends on an input algebraically (direct feed-through)."""
+    """Return whether a compared output depends on an input algebraically (direct feed-through).
+
+    The dependence is searched along the equations of all modes together, from the source of each
+    output in `output_names`; a path through a state does not count.
+    """
     edges: dict[str, set[str]] = {}
     for mode in automaton.all_modes:
         for name, formula in mode.equations.items():
@@ -161,11 +169,10 @@ def resample(
     output_names: Sequence[str],
     is_first_order_hold: bool,
 ) -> tuple[SampledRecording, ...]:
-    """Return recordings with the given hold of their inputs, decimated if no output has
-    feed-through.
+    """Return recordings with the given hold, decimated if no compared output has feed-through.
 
-    With direct feed-through the recordings keep their samples, because an output that follows the
-    mean of an input was never measured.
+    With direct feed-through (`has_feedthrough`) the recordings keep their samples and only the hold
+    is set, because an output that follows the mean of an input was never measured.
     """
     if has_feedthrough(automaton, output_names):
         return tuple(
@@ -175,7 +182,10 @@ def resample(
 
 
 def require_equal_periods(series: Sequence[SampledRecording]) -> None:
-    """Raise ValueError if the recordings do not all have the same period."""
+    """Raise ValueError if the recordings do not all have the same period.
+
+    The message names the last recording of each period, with its rate.
+    """
     rates = {one.period: f"{one.name} ({float(1 / one.period):g} Hz)" for one in series}
     if len(rates) > 1:
         named = ", ".join(rates.values())
@@ -183,12 +193,13 @@ def require_equal_periods(series: Sequence[SampledRecording]) -> None:
 
 
 def decimate(series: SampledRecording, is_first_order_hold: bool = False) -> SampledRecording:
-    """Return a recording decimated by an integer factor to a period of about `DECIMATED_PERIOD`.
+    """Return a recording decimated by an integer factor n, to a period of at most 5 ms.
 
-    Outputs are every n-th sample. A held input is the mean over the samples until the next one; an
-    input with first-order hold is the mean over a centred window. A recording that is not at least
-    twice as fast keeps its samples. Driveline dynamics are slower than this period, and the cost of
-    a fit is proportional to the number of samples.
+    n is `DECIMATED_PERIOD` over the period, rounded down and at least 1; samples after the last
+    full group of n are dropped. Outputs are the first of each n samples (no filter). A held input
+    is the mean of the n samples; an input with first-order hold is the mean over a centred window
+    of n samples (n + 1 if n is even), with the edge values repeated. Driveline dynamics are slower
+    than this period, and the cost of a fit is proportional to the number of samples.
     """
     factor = max(1, int(DECIMATED_PERIOD / series.period))
     count = series.count // factor
@@ -210,8 +221,9 @@ def decimate(series: SampledRecording, is_first_order_hold: bool = False) -> Sam
 
 
 def grid_period(times: Reals) -> Fraction:
-    """Return the median difference [s] of time stamps,
-    as the inverse of a whole rate if within 2 %.
+    """Return the median difference [s] of time stamps; 1/n if a whole rate n [Hz] is within 2 %.
+
+    Otherwise it is a fraction with a denominator of at most 1 000 000. Needs at least two stamps.
     """
     usual = float(np.median(np.diff(times)))
     rate = round(1.0 / usual)

@@ -12,8 +12,8 @@ Reals = NDArray[np.float64]
 def spectrum(values: Reals, rate: float, max_window: int) -> tuple[Reals, Reals]:
     """Return frequencies [Hz] and the one-sided power spectral density of a signal (Welch 1967).
 
-    `values` (samples,) are sampled at `rate` [Hz]. The Hann windows have at most `max_window`
-    samples, overlap by half, and are taken without their mean.
+    `values` (samples,) are sampled at `rate` [Hz]. The Hann windows have `max_window` samples (all
+    if there are fewer), overlap by half, and the mean of each window is subtracted.
     """
     length = min(len(values), max_window)
     frequencies, power = welch(

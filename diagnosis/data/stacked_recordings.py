@@ -35,15 +35,18 @@ _cache: OrderedDict[tuple[int, ...], StackedExperiments] = OrderedDict()
 
 
 def burn_in_samples(series: SampledRecording) -> int:
-    """Return the number of samples in the burn-in of a recording, at least 1."""
+    """Return the samples in the burn-in of a recording: `BURN_IN` (0.5 s), rounded, at least 1.
+
+    It may exceed the number of samples of the recording.
+    """
     return max(1, round(BURN_IN / float(series.period)))
 
 
 def stack_recordings(series: Sequence[SampledRecording]) -> StackedExperiments:
-    """Return recordings concatenated in their order; the result is cached.
+    """Return recordings concatenated in their order; the last `CACHE_SIZE` (24) sets are cached.
 
-    The cache key is the identity of the recordings. An entry holds its recordings, so no other
-    object can have the same identity meanwhile.
+    The cache key is the identity of the recordings, so the same objects give the same result
+    object. An entry holds its recordings, so no other object can have the same identity meanwhile.
     """
     key = tuple(id(one) for one in series)
     stacked = _cache.get(key)
