@@ -59,12 +59,14 @@ def discover_equation(
     threshold: float,
     log: LogCallback = lambda text: None,
 ) -> DiscoveredEquation | None:
-    """Return the formula with the largest gain over the base, or None if none exceeds `threshold`.
+    """Return the formula with the largest gain over the base; None if none exceeds `threshold`.
 
-    The smaller one of the penalised and the cross-validated gain [nats] must exceed the threshold.
-    A formula at a location of higher rank, fitted again from the parameters of the best one, is
-    preferred if it has at least `LEADING_FRACTION` of its gain. `locations` are in the order of
-    their ranks.
+    At most `MAX_FITS` formulas, at the first `MAX_LOCATIONS` of `locations` (in the order of their
+    ranks) with a gain and no accepted effect, are fitted; the one with the largest total gain is
+    taken. The smaller one of its penalised and its cross-validated gain [nats] must exceed the
+    threshold. A formula at a location of higher rank, fitted again from the parameters of the best
+    one, replaces it if it has more than `LEADING_FRACTION` of its gain. `units` are the disturbance
+    units [SI]; `log` gets a line for each fitted formula.
     """
     equations: list[DiscoveredEquation] = []
     for formula, location in _propose_formulas(model_set, base, locations):

@@ -46,8 +46,10 @@ class DisturbanceResponse:
     steady_state_gains: Reals = field(repr=False)
 
     def predict(self, disturbance: Sequence[Reals]) -> tuple[Prediction, ...]:
-        """Return the predictions of all recordings under a disturbance,
-        (samples,) for each recording.
+        """Return the predictions of all recordings while the disturbance follows given values.
+
+        `disturbance` is in SI units, (samples,) for each recording; a prediction has all outputs of
+        the model with the disturbance, and no Huber limits.
         """
         pages, recorded = self._with_disturbance(disturbance)
         predictor, substeps = self.candidate.predictor, self.candidate.compiled.substeps
@@ -58,7 +60,11 @@ class DisturbanceResponse:
         return runs.split()
 
     def predict_innovations(self, disturbance: Sequence[Reals]) -> list[Reals]:
-        """Return the innovations of such predictions after the burn-in, (samples, outputs) each."""
+        """Return the innovations of compared outputs while the disturbance follows given values.
+
+        `disturbance` is (samples,) for each recording. The result is (samples, outputs) for each,
+        after the burn-in: the innovations of `predict`, without storing states.
+        """
         pages, recorded = self._with_disturbance(disturbance)
         predictor, substeps = self.candidate.predictor, self.candidate.compiled.substeps
         runs = predictor.predict_points(
@@ -87,8 +93,10 @@ class DisturbanceResponse:
         return [self.model.values(k) for k in range(len(self.series))]
 
     def innovations(self, predictions: Sequence[Prediction]) -> list[Reals]:
-        """Return the innovations of the compared outputs after the burn-in, (samples,
-        outputs) each.
+        """Return the innovations of the compared outputs from predictions, (samples, outputs) each.
+
+        The burn-in of the first recording is cut off each; element torques and disturbance are left
+        out.
         """
         return self._after_burn_in([one.innovations for one in predictions])
 
@@ -104,7 +112,10 @@ def build_disturbance_response(
 ) -> DisturbanceResponse:
     """Return the model of a fit, compiled with a disturbance at `section.place`.
 
-    Raises SpecError.
+    The disturbance is named `probe_<place>`, cut to 25 characters. It has the effects of the fit
+    and all disturbances of the model set besides. Its Kalman gains are those of the fit; the gain
+    from the disturbance output to the disturbance state is 1. Raises SpecError if the disturbance
+    cannot be placed, KeyError for a section other than flow, elements and outputs.
     """
     kind = DISTURBANCE_KIND_BY_SECTION[section]
     disturbance = disturbance_effect(kind, place)
@@ -125,9 +136,9 @@ def build_disturbance_response(
 
 
 def element_torques(automaton: Automaton) -> tuple[str, ...]:
-    """Return the names of the torques that elastic elements transmit.
+    """Return the names of the torques of elements, in the order of the elements.
 
-    Elements whose torque is an expression are left out.
+    Only elements whose `torque` is a single name are included, not those with an expression.
     """
     trees = [
         one.parts["torque"].tree for one in automaton.elements.values() if "torque" in one.parts

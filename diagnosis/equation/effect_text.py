@@ -43,9 +43,11 @@ class FormulaEffect:
     def format_fitted(
         self, values: Mapping[str, Quantity], fitted: Sequence[Mapping[str, float]]
     ) -> str:
-        """Return the formula with fitted values, such as `12.3 N*m * sin(3 * angle of w_w + 0.4)`.
+        """Return the formula with fitted values, such as `12.3 N*m * sin(3 * angle of w_w + 0.40)`.
 
-        `fitted` are the values [SI] of each recording.
+        The terms are joined with ` + `. `values` are the fitted quantities by qualified name,
+        `fitted` the values [SI] of each recording: a coefficient per recording is a list `{1.2,
+        3.4} N*m`, and a phase is the word `phase` if there are several recordings.
         """
         return " + ".join(
             _format_term(
@@ -67,9 +69,13 @@ def build_formula(
     weights: Sequence[Reals],
     number: int = 1,
 ) -> FormulaEffect:
-    """Return terms with coefficients (recordings, waves) as an effect. Raises SpecError.
+    """Return the sum of terms as an effect, with initial values.
 
-    `number` makes its name unique, because a model set identifies candidates by effect names.
+    Its name is `unknown_<number>_at_<place>`. `weights` are the coefficients of each term,
+    (recordings, waves). A coefficient starts at their root mean square over recordings for a sine
+    or a coefficient per recording, else at their mean; its range is `RANGE_FACTOR` times the root
+    mean square. A model set identifies candidates by effect names, so `number` must be unique.
+    Raises SpecError if the text of the effect is invalid.
     """
     parts = [
         _term_text(model_set, section, place, k, *pair)

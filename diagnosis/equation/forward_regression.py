@@ -63,8 +63,9 @@ def build_problem(
 ) -> RegressionProblem:
     """Return the regression problem of normalised innovations (samples,) of each recording.
 
-    `parameters` (samples, parameters) and `features` (samples, columns) are the decreases of the
-    innovations per unit of each coefficient.
+    `parameters` (samples, parameters) and `features` (samples, columns) of each recording are the
+    decreases of the innovations per unit of each coefficient. Each recording is cut into `FOLDS`
+    (4) parts of consecutive samples, whose products are kept apart for the cross-validation.
     """
     products = []
     for e, moved, wave in zip(innovations, parameters, features, strict=True):
@@ -79,7 +80,11 @@ def build_problem(
 def rank_terms(
     problem: RegressionProblem, columns: Sequence[TermColumns]
 ) -> list[tuple[float, TermColumns]]:
-    """Return the penalised gain [nats] of each term alone, with the term, in descending order."""
+    """Return the penalised gain [nats] of each term alone, with the term, in descending order.
+
+    The gain is the decrease of the cost, with the model's parameters fitted as well, minus the BIC
+    penalty of the term; it can be negative. Equal gains keep the order of `columns`.
+    """
     before = _cost(problem, [])
     ranked = [
         (before - _cost(problem, [one]) - _complexity_penalty(problem, one), one) for one in columns
@@ -90,10 +95,11 @@ def rank_terms(
 def select_terms(
     problem: RegressionProblem, columns: Sequence[TermColumns], max_terms: int, min_gain: float
 ) -> list[SelectedTerm]:
-    """Return the terms of a forward selection, each with a penalised gain of at least `min_gain`
-    [nats].
+    """Return the terms of a forward selection, at most `max_terms`, in the order of selection.
 
-    Terms after the first must also have this gain in the cross-validation.
+    Each step takes the term with the largest penalised gain over the terms before it; the selection
+    ends when that is below `min_gain` [nats]. A term after the first must also have a
+    cross-validated gain of at least `min_gain`; if it has not, the selection ends.
     """
     chosen: list[SelectedTerm] = []
     selected: list[TermColumns] = []
@@ -118,7 +124,11 @@ def select_terms(
 
 
 def coefficients_of(problem: RegressionProblem, selected: Sequence[TermColumns]) -> list[Reals]:
-    """Return the least-squares coefficients of each selected term, (recordings, waves) each."""
+    """Return the least-squares coefficients of each selected term, (recordings, waves) each.
+
+    The model's parameters are fitted together with them, with their priors. A term without
+    coefficients per recording has the same row for each recording.
+    """
     fit = _solve_least_squares(problem, selected, np.sum(problem.products, axis=1))
     shared, own = problem.parameters, 0
     coefficients = []

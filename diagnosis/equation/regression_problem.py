@@ -37,9 +37,12 @@ class EquationRegression:
 def regression_at(
     model_set: ModelSet, model: Estimate, section: str, place: str
 ) -> EquationRegression:
-    """Return the regression of a model's innovations on terms at `section.place`.
+    """Return the regression of a model's innovations on the terms of `generate_terms` at a place.
 
-    Raises SpecError.
+    The columns are the responses of the innovations to each term as a disturbance at
+    `section.place`, preceded by the derivatives for the model's own parameters; all are weighted by
+    inverse standard deviations and Huber weights. Raises SpecError if no disturbance can be placed
+    there.
     """
     probe = build_disturbance_response(model_set, section, place, model)
     zero_disturbance = [np.zeros(one.count) for one in model_set.series]

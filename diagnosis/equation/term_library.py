@@ -63,12 +63,20 @@ class Signals:
     period: float
 
     def largest(self, name: str) -> float:
-        """Return the largest magnitude of a signal, or 1 if it is 0."""
+        """Return the largest magnitude of a signal over all recordings, or 1 if that is 0."""
         return float(max(np.max(np.abs(values)) for values in self.values[name])) or 1.0
 
 
 def generate_terms(signals: Signals, section: str, output: str = "") -> Iterator[LibraryTerm]:
-    """Yield the terms that may act at a place of a section; `output` is the signal of an output."""
+    """Yield the terms that may act at a place of a section, with their values.
+
+    First come a constant and a constant of each recording. For section "outputs" follow only terms
+    of the signal `output`: itself, lags and orders (multiples) of each angle. For any other
+    section: sign, value and square of each speed; powers, magnitude, limits, products with speeds,
+    lags, rate limits and growth of each torque; powers 2 and 3 and lags of each deflection; and
+    orders of each angle, alone and times each torque. The tested values are `ORDERS`, `LAGS`,
+    `RISE_TIMES`, `LIMIT_FRACTIONS`.
+    """
     count = {name: [len(one) for one in values] for name, values in signals.values.items()}
     lengths = next(iter(count.values()))
     ones = [np.ones(n) for n in lengths]

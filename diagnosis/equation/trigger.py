@@ -47,8 +47,10 @@ def triggers_discovery(
 ) -> bool:
     """Return whether a formula should be searched, by the outcome and the gains that are left.
 
-    It is always searched for unknown and ambiguous outcomes. `unexplained` is the gain [nats] that
-    the base leaves, `remaining_gain` the one that accepted effects leave.
+    Always for the outcomes `unknown` and `ambiguous`. For `nothing_missing` if `unexplained`, the
+    gain [nats] that the base leaves, exceeds `UNEXPLAINED_FACTOR` (2.5) thresholds. Otherwise if
+    `remaining_gain`, the one that accepted effects leave, exceeds `REMAINDER_FACTOR` (2) thresholds
+    and `REMAINDER_FRACTION` (0.3) of the sum of their penalised gains.
     """
     if outcome in ("unknown", "ambiguous"):
         return True
@@ -62,7 +64,8 @@ def triggers_discovery(
 def has_large_remainder(selection: Selection, remaining_gain: float, threshold: float) -> bool:
     """Return whether a term beside accepted effects gains nearly as much as they do.
 
-    The effects are then wrong, whether or not a better formula is found.
+    `remaining_gain` [nats] must exceed `threshold` and `LARGE_REMAINDER_FRACTION` (0.8) of the sum
+    of their penalised gains. The effects are then wrong, whether or not a better formula is found.
     """
     return remaining_gain > max(threshold, LARGE_REMAINDER_FRACTION * _gained(selection))
 
@@ -75,7 +78,11 @@ def _gained(selection: Selection) -> float:
 
 
 def needs_no_disturbance(selection: Selection, units: Mapping[str, float]) -> bool:
-    """Return whether all disturbances of the selected model have small levels."""
+    """Return whether all disturbances in `units` have small levels in the selected model.
+
+    Small is below `MAX_DISTURBANCE_LEVEL` (0.5) units; a disturbance that the model does not have
+    counts as 0. True without `units`.
+    """
     drifts = selection.model.noise_levels.process
     return all(drifts.get(name, 0.0) < MAX_DISTURBANCE_LEVEL * unit for name, unit in units.items())
 
@@ -85,7 +92,9 @@ def remaining_term_gain(
 ) -> float:
     """Return the largest gain [nats] of a term in the balances of accepted effects, beside them.
 
-    It is 0 if the model needs no disturbance.
+    It is the penalised gain of one term alone by `rank_terms`, at least 0. Balances at which the
+    regression raises SpecError are left out. The result is 0 if the model needs no disturbance
+    (`needs_no_disturbance`) or nothing is accepted.
     """
     most, model = 0.0, selection.model
     if needs_no_disturbance(selection, units):
@@ -102,7 +111,11 @@ def remaining_term_gain(
 
 
 def outperforms_effects(equation: DiscoveredEquation, selection: Selection) -> bool:
-    """Return whether a formula gains clearly more than all accepted effects together."""
+    """Return whether a formula gains clearly more than all accepted effects together.
+
+    Its `ranking_gain` must exceed `EQUATION_GAIN_FACTOR` (1.5) times the sum of theirs; effects
+    without a likelihood gain count 0.
+    """
     gains = [
         ranking_gain(tried.likelihood_gain) for tried in selection.accepted if tried.likelihood_gain
     ]
@@ -110,8 +123,9 @@ def outperforms_effects(equation: DiscoveredEquation, selection: Selection) -> b
 
 
 def select_equation(selection: Selection, equation: DiscoveredEquation) -> Selection:
-    """Return a selection in which a formula is the
-    accepted effect and no library effect is likely.
+    """Return the selection with a formula as its only accepted effect and model, without rivals.
+
+    `other` is raised to the total gain of the formula if that is larger; all else is unchanged.
     """
     tried = CandidateFit(
         equation.formula.placed_effect,
