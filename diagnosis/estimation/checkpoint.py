@@ -53,8 +53,10 @@ class FitCache:
     ) -> Estimate:
         """Return the stored estimate of a fit, or compute it with `fit` and store it.
 
-        The key is a hash of `label`, the code, the candidate, the recordings and `dependencies`. An
-        unreadable file is computed again, and a failure to write is ignored.
+        The file is `<hash>.npz` in `folder`; the hash is of `label`, the code, `model_key`, the
+        candidate, the recordings and `dependencies`. An unreadable file is computed again, and a
+        failure to write is ignored. `before_fit` is called before `fit`, not for a stored estimate;
+        what it or `fit` raises is passed on. Without a folder `fit` is always called.
         """
         if self.folder is None:
             self.before_fit()
@@ -79,10 +81,11 @@ NO_CACHE = FitCache()
 
 
 def hash_of(*values: object) -> str:
-    """Return a hash (32 hex digits) of values; equal bits and types have equal hashes.
+    """Return a hash (32 hex digits of SHA-256) of values; equal bits and types have equal hashes.
 
-    Supported are candidates, arrays, mappings (in sorted order of keys), sequences, dataclasses,
-    numbers, strings and None; other types raise TypeError.
+    Supported are candidates (by effect identities and compiled model), arrays, mappings (in sorted
+    order of keys), tuples, lists, dataclasses, numbers, Fractions, strings and None; other types
+    raise TypeError.
     """
     digest = hashlib.sha256()
     for value in values:

@@ -15,7 +15,9 @@ from diagnosis.estimation.quantity import Quantity
 def quantities_of(model: Estimate) -> dict[str, Quantity]:
     """Return the value [SI] and standard deviation of each free parameter, by name.
 
-    A parameter per recording has the mean of its values.
+    A parameter per recording has the mean of its values, and the standard deviation of an average
+    recording with the shared parameters fixed. That of a logarithmic coordinate is scaled to the
+    value. The model must have normal equations.
     """
     spread = _coordinate_stds(model)
     recordings = len(model.point.per_recording)
@@ -29,8 +31,10 @@ def quantities_of(model: Estimate) -> dict[str, Quantity]:
 
 
 def correlations_of(model: Estimate) -> Mapping[tuple[str, str], float]:
-    """Return the correlations of pairs of shared parameters,
-    in descending order of their magnitude.
+    """Return the correlations of all pairs of shared parameters, largest magnitude first.
+
+    The key is (name, name) in the order of the candidate. Parameters per recording are left out.
+    The model must have normal equations.
     """
     covariance, names = covariance_of(model)
     sizes = np.sqrt(np.diag(covariance))
@@ -44,7 +48,8 @@ def correlations_of(model: Estimate) -> Mapping[tuple[str, str], float]:
 def covariance_of(model: Estimate) -> tuple[Reals, list[str]]:
     """Return the posterior covariance (n, n) of the shared coordinates, and their names.
 
-    It is the inverse of J'WJ + I, where I comes from the standard normal priors.
+    It is the inverse of J'WJ + I, where I comes from the standard normal priors. Coordinates per
+    recording are left out, as if they were fixed. The model must have normal equations.
     """
     assert model.normal_equations is not None
     free = ~model.normal_equations.own

@@ -32,11 +32,11 @@ def share_operating_points(
     near_candidate: Candidate,
     near_prediction: PredictionResult,
 ) -> PredictionResult:
-    """Return a prediction with the modes and the common states of the prediction of a similar
-    model.
+    """Return a prediction with the modes and the common states of that of a similar model.
 
-    Both are of the same recordings. The prediction is returned unchanged if the modes or the
-    numbers of samples differ, or if a run was incomplete.
+    Both are of the same recordings; states are matched by name, and only `runs` is changed.
+    `prediction` itself is returned if the modes of the models or the numbers of samples differ, if
+    a run was incomplete, or if a state of the result would not be finite.
     """
     mine, theirs = prediction.runs.stacked, near_prediction.runs.stacked
     is_alike = (
@@ -82,11 +82,14 @@ class Estimate:
 
     @property
     def negative_log_likelihood(self) -> float:
-        """The cost without priors [nats]."""
+        """The cost without priors [nats]; infinite if a run diverged."""
         return self.prediction.negative_log_likelihood()
 
     def values(self, recording: int) -> dict[str, float]:
-        """Return the values [SI] of the free parameters for one recording, by name."""
+        """Return the values [SI] of the free parameters for one recording (its index), by name.
+
+        Shared parameters have the same value for each recording.
+        """
         return values_at(self.candidate, self.point, recording)
 
 
@@ -100,7 +103,9 @@ def evaluate(
     """Return a candidate at a point, with Kalman gains for its operating points.
 
     The operating points are those of the prediction `nearby`. Without it, a first prediction with
-    gains for the initial state gives the operating points for the final gains.
+    gains for the initial state gives the operating points for the final gains; the first one is
+    kept if it diverges. The gains are computed with the values of the first recording. The cost is
+    infinite if a run diverges. The estimate has no normal equations.
     """
     values = values_at(candidate, point, 0)
     gains = kalman_gains(candidate, series, values, noise_levels, nearby)
@@ -119,10 +124,12 @@ def evaluate_near(
     point: ParameterVector,
     nearby: Estimate | None,
 ) -> Estimate:
-    """Return the candidate at a point with the better of two sets of Kalman gains.
+    """Return the candidate at a point with the better of two sets of Kalman gains, by cost.
 
     One set is for the candidate's own operating points, the other for those of the similar model
-    `nearby`. The cost is infinite if the candidate diverges; without `nearby` this is `evaluate`.
+    `nearby`; the own ones stay if both cost the same or the models cannot be matched
+    (`share_operating_points`). The cost is infinite if the candidate diverges with gains for its
+    initial state; without `nearby` this is `evaluate`.
     """
     if nearby is None:
         return evaluate(candidate, series, noise_levels, point)
@@ -144,8 +151,9 @@ def with_normal_equations(
 ) -> Estimate:
     """Return an estimate with the Jacobian and the normal equations at its point.
 
-    Columns given in `jacobian` (of a similar model) are used; the others are computed by
-    differences.
+    Columns given in `jacobian` (by name, of a similar model) are used as they are; those of other
+    parameters and noise levels are computed by finite differences. The point, gains, cost and
+    prediction do not change.
     """
 
     def run(points: Sequence[ParameterVector]) -> list[Innovations]:
@@ -193,7 +201,9 @@ def gains_at(
 ) -> KalmanGains:
     """Return the Kalman gains for the noise levels at a point.
 
-    Without noise parameters these are the gains of the estimate.
+    Without noise parameters these are the gains of the estimate. Otherwise they are computed for
+    the operating points of the estimate and its values of the first recording: the point changes
+    the noise levels only.
     """
     if not estimate.candidate.noise_parameters:
         return estimate.gains
@@ -211,7 +221,11 @@ def predict_at(
     gains: KalmanGains,
     noise_levels: NoiseLevels,
 ) -> PredictionResult:
-    """Return the prediction of recordings by a candidate at a point, with given gains."""
+    """Return the prediction of recordings by a candidate at a point, with given gains.
+
+    Of `noise_levels` only the Huber limits are used. Values of the point beyond the number of
+    recordings are ignored.
+    """
     values = all_values_at(candidate, point)[: len(series)]
     return predict(candidate, series, values, gains, noise_levels.huber_limits)
 
@@ -219,8 +233,9 @@ def predict_at(
 def predict_with_gains_of(
     estimate: Estimate, series: Sequence[SampledRecording], point: ParameterVector
 ) -> PredictionResult:
-    """Return the prediction of recordings by the estimate's candidate at a point,
-    with its gains.
+    """Return the prediction by the estimate's candidate at `point`, with the estimate's gains.
+
+    The Huber limits are those of the estimate; recordings may differ from those of its fit.
     """
     return predict_at(estimate.candidate, series, point, estimate.gains, estimate.noise_levels)
 
@@ -228,7 +243,10 @@ def predict_with_gains_of(
 def innovations_at(
     estimate: Estimate, series: Sequence[SampledRecording], points: Sequence[ParameterVector]
 ) -> list[Innovations]:
-    """Return the innovations of recordings at each of several points, with the estimate's gains."""
+    """Return the innovations of recordings at each of several points, with the estimate's gains.
+
+    They are in the order of `points`; empty for no points.
+    """
     candidate, gains = estimate.candidate, estimate.gains
     values = [all_values_at(candidate, point)[: len(series)] for point in points]
     return (
@@ -241,7 +259,10 @@ def innovations_at(
 def evaluate_with_gains_of(
     estimate: Estimate, series: Sequence[SampledRecording], point: ParameterVector
 ) -> Estimate:
-    """Return the estimate at another point, or for other recordings, with its own gains."""
+    """Return the estimate at another point, or for other recordings, with its own gains.
+
+    Cost and prediction are new; the result has no normal equations and no Jacobian.
+    """
     prediction = predict_with_gains_of(estimate, series, point)
     cost = prediction.negative_log_likelihood() + point.prior_cost(estimate.candidate)
     return Estimate(

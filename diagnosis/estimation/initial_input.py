@@ -27,7 +27,10 @@ MIN_GAIN = 3.0
 
 
 def average_initial_inputs(series: SampledRecording) -> SampledRecording:
-    """Return a recording whose first input sample is the mean over the first 0.1 s."""
+    """Return a recording whose first sample of each input is the mean over the first 0.1 s.
+
+    The window is `AVERAGING_TIME`, rounded to samples, at least 1; other samples do not change.
+    """
     count = max(1, round(AVERAGING_TIME / float(series.period)))
     inputs = series.inputs.copy()
     inputs[0] = np.mean(inputs[:count], axis=0)
@@ -39,8 +42,10 @@ def choose_initial_inputs(
 ) -> tuple[SampledRecording, ...]:
     """Return recordings with the first inputs that the base predicts best.
 
-    The recorded first inputs stay unless an alternative gains more than `MIN_GAIN`. The recordings
-    may differ from those of the fit, because a base has no parameters per recording.
+    An alternative has one input larger or smaller by `HYPOTHESIS_STDS` (4) standard deviations of
+    its noise at the first sample. The one of least cost is taken if it gains more than `MIN_GAIN`
+    (3 nats) over the recorded inputs; else the recording itself is returned. The recordings may
+    differ from those of the fit, because a base has no parameters per recording.
     """
     variances = model.prediction.variances
     shared_point = ParameterVector(model.point.shared, model.point.shared[np.newaxis])

@@ -99,7 +99,7 @@ class PredictionResult:
 
     @cached_property
     def slices(self) -> list[slice]:
-        """The slice of each recording in the stacked innovations."""
+        """The slice of each recording in `stacked`; empty for one not longer than its burn-in."""
         return [slice(low, high) for low, high in pairwise(self._edges)]
 
     @property
@@ -109,7 +109,11 @@ class PredictionResult:
 
     @cached_property
     def blocks(self) -> list[FoldBlock]:
-        """The blocks for cross-validation, `FOLDS` for each recording."""
+        """The blocks for cross-validation: `FOLDS` (5) of nearly equal length for each recording.
+
+        They are in order of time; block k of recording r belongs to the fold (r + k) modulo
+        `FOLDS`.
+        """
         return _fold_blocks(self._edges)
 
     @property
@@ -122,7 +126,7 @@ class PredictionResult:
     def negative_log_likelihood(self) -> float:
         """Return the concentrated negative log-likelihood [nats], infinite for an incomplete run.
 
-        It is the sum over outputs of N/2 log(mean square innovation).
+        It is the sum over outputs of N/2 log(mean robust square innovation), after the burn-in.
         """
         if not self.is_complete:
             return np.inf
@@ -130,27 +134,32 @@ class PredictionResult:
 
     @cached_property
     def robust_squares(self) -> Reals:
-        """The squares of the stacked innovations, linear beyond the limits (Huber 1964), (n,
-        outputs).
+        """The squares of the stacked innovations, linear beyond the Huber limits, (n, outputs).
+
+        Beyond a limit h the value of e is h (2 |e| - h) (Huber 1964); NaN stays NaN.
         """
         size = np.abs(self.stacked)
         near = np.minimum(size, self.huber_limits)
         return np.asarray(near * (2.0 * size - near), dtype=np.float64)
 
     def robust_std(self) -> Reals:
-        """Return the standard deviation of the innovations
-        from their median magnitude (outputs,).
+        """Return 1.4826 times the median magnitude of the innovations of each output (outputs,).
+
+        This is the standard deviation of normal innovations. NaN is ignored.
         """
         return MAD_TO_STD * np.nanmedian(np.abs(self.stacked), axis=0)
 
     @cached_property
     def counts(self) -> Reals:
-        """The number of known innovations of each output (outputs,)."""
+        """The number of known (not NaN) innovations of each output after the burn-in (outputs,)."""
         return np.asarray(self.runs.counts.sum(axis=0), dtype=np.float64)
 
     @cached_property
     def variances(self) -> Reals:
-        """The mean robust square innovation of each output (outputs,)."""
+        """The mean robust square innovation of each output (outputs,), over all recordings.
+
+        It is at least 1e-300, also for an output without a known innovation.
+        """
         squares = self.runs.squared_sums.sum(axis=0)
         found: Reals = np.maximum(squares / np.maximum(self.counts, 1.0), 1e-300)
         return found
@@ -181,12 +190,12 @@ class Innovations:
 
     @property
     def robust_square_sums(self) -> Reals:
-        """The sums of the robust squares (recordings, outputs)."""
+        """The sums of known robust squares after the burn-in (recordings, outputs)."""
         return self._sums[0]
 
     @property
     def counts(self) -> Reals:
-        """The number of known innovations (recordings, outputs)."""
+        """The number of known innovations after the burn-in (recordings, outputs)."""
         return self._sums[1]
 
     @cached_property
@@ -198,10 +207,11 @@ class Innovations:
 def measured_noise_levels(
     series: Sequence[SampledRecording], process: Mapping[str, float]
 ) -> NoiseLevels:
-    """Return the noise levels of outputs and inputs estimated from recordings: their medians.
+    """Return the noise levels of outputs and inputs: the medians over the recordings' `noise`.
 
-    The noise of an output is at least a millionth of its magnitude. `process` gives the levels of
-    the disturbance states; the Huber limits are infinite.
+    The noise of an output is at least a millionth of the largest magnitude of any output (the
+    median over recordings). `process` gives the levels of the disturbance states; the Huber limits
+    are infinite.
     """
     output_noise, inputs = [np.array([one.noise[k] for one in series]) for k in (0, 1)]
     floor = [float(np.nanmax(np.abs(one.measured))) * 1e-6 + 1e-12 for one in series]
@@ -212,10 +222,10 @@ def measured_noise_levels(
 def noise_levels_at(
     candidate: Candidate, point: ParameterVector, noise_levels: NoiseLevels
 ) -> NoiseLevels:
-    """Return the noise levels with those that are noise parameters of the candidate set from a
-    point.
+    """Return noise levels with those that are noise parameters of the candidate set from a point.
 
-    The noise of all inputs is scaled by one factor.
+    The others stay as in `noise_levels`, which is returned itself without noise parameters. The
+    noise of all inputs is scaled by one factor, so that the largest one is the parameter's value.
     """
     if not candidate.noise_parameters:
         return noise_levels
@@ -244,7 +254,11 @@ def predict(
     gains: KalmanGains,
     huber_limits: Reals,
 ) -> PredictionResult:
-    """Return the prediction of recordings, each with its own parameter values [SI]."""
+    """Return the prediction of recordings, each with its own parameter values [SI].
+
+    `values` has one mapping for each recording; a parameter that it does not name has its declared
+    value. A run that diverges gives an incomplete result, not an error.
+    """
     stacked = stack_recordings(series)
     recorded = stacked.recorded
     runs = candidate.predictor.predict_recordings(
@@ -268,7 +282,8 @@ def predict_at_points(
 ) -> list[Innovations]:
     """Return the innovations of recordings at several points: `values[point][recording]` [SI].
 
-    The points run in parallel SIMD lanes; states are not stored.
+    They are in the order of the points, all with the same gains. The points run in parallel SIMD
+    lanes; states are not stored.
     """
     stacked = stack_recordings(series)
     recorded, predictor = stacked.recorded, candidate.predictor
@@ -291,7 +306,8 @@ def predict_with_gains(
 ) -> list[Innovations]:
     """Return the innovations of recordings at one point for each of several Kalman gains.
 
-    Gains with equally long transients run in parallel SIMD lanes; states are not stored.
+    They are in the order of `gains`. Gains with equally long transients run in parallel SIMD lanes;
+    states are not stored.
     """
     stacked = stack_recordings(series)
     recorded, predictor = stacked.recorded, candidate.predictor

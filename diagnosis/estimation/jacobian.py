@@ -44,9 +44,11 @@ def difference_jacobian(
 ) -> Jacobian:
     """Return the derivatives of the innovations with respect to the named coordinates.
 
-    They are forward differences with the step `STEP`. A coordinate whose innovations change by more
-    than `LINEAR_RANGE` is repeated with narrower steps; the wide difference is kept if both agree.
-    `run` evaluates all points of one width together.
+    They are forward differences with the step `STEP` (2e-3). A coordinate whose innovations change
+    by more than `LINEAR_RANGE` (0.05 standard deviations, root mean square) is repeated with
+    narrower steps down to `MIN_STEP`; the wide difference is kept if it correlates with the last
+    narrow one by at least `MIN_AGREEMENT`. Derivatives are clipped to `MAX_CHANGE`, and 0 where
+    they are not finite. `run` evaluates all points of one width together.
     """
     scale = np.sqrt(prediction.variances)
 
@@ -119,12 +121,12 @@ def broyden_update(
     after: PredictionResult,
     step: ParameterVector,
 ) -> Jacobian:
-    """Return the Jacobian at the end of a step from the one at its start (Broyden 1965, equation
-    4.5).
+    """Return the Jacobian at the end of a step from the one at its start (Broyden 1965, eq. 4.5).
 
     It is the rank-one update of least norm that reproduces the change of the innovations. With
     coordinates per recording each recording is updated by itself. `step` is the change of each
-    coordinate.
+    coordinate; a step with a squared length below `MIN_SQUARED_STEP` changes nothing. `jacobian`
+    itself is not changed.
     """
     own, names = per_recording_mask(candidate), candidate.names
     updated = {name: jacobian[name].copy() for name in names}

@@ -47,11 +47,12 @@ def kalman_gains(
 ) -> KalmanGains:
     """Return the Kalman gains of a candidate at `values` for the operating points of `prediction`.
 
-    The mode with the longest dwell time has the steady-state gain, and its transient is used during
-    the burn-in. The gain of another mode is the one after its median dwell time, starting from the
+    The mode with the longest stay has the steady-state gain, and its transient is used during the
+    burn-in. The gain of another mode is the one after its median dwell time, starting from the
     steady covariance: a short stay, as in a gap, does not reach a steady state. Modes without an
-    operating point have the gain of the first mode. With the output-error criterion the steady
-    gains are 0.
+    operating point or a valid gain have the gain of the first mode that has one (0 if none has).
+    Without `prediction` the only operating point is the start of the first recording. With the
+    output-error criterion the steady gains are 0, the transient is not.
     """
     count = burn_in_samples(series[0])
     steady_by_mode: dict[int, Reals] = {}
@@ -89,11 +90,12 @@ def local_models(
     noise_levels: NoiseLevels,
     prediction: PredictionResult | None = None,
 ) -> dict[int, LocalModel]:
-    """Return the linearised candidate in each mode of `prediction`, the longest dwell time first.
+    """Return the linearised candidate in each mode of `prediction`, the longest stay first.
 
-    The process noise has parts from the inputs, the disturbance states and, very small, every
-    state. Delays are set to 0, because a delayed output would seem to contain no information on the
-    states.
+    The operating points are those of `linearise_modes`; modes without one, or with an invalid
+    linearisation, are left out. The process noise has parts from the inputs, the disturbance states
+    and, very small (`MODEL_NOISE_FRACTION`), every state but integrators that effects add. Delays
+    are set to 0, because a delayed output would seem to contain no information on the states.
     """
     zero_delays = dict.fromkeys(candidate.compiled.delays, 0.0)
     page = candidate.calibration_page({**values, **zero_delays}, series[0])

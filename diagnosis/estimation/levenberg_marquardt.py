@@ -62,11 +62,12 @@ def estimate_parameters(
     max_iterations: int = MAX_ITERATIONS,
     jacobian: Jacobian | None = None,
 ) -> Estimate:
-    """Return the candidate at the point of least cost, found from `start` (values [SI] or a
-    vector).
+    """Return the candidate at the point of least cost, found from `start`.
 
-    The result has normal equations at its point if it converged. `jacobian` is an approximate
-    Jacobian near the start.
+    `start` is a vector, or values [SI] of some parameters (the others start at their first start
+    value, or at their declared value). The steps of `iterate` are followed by `refine`. If the cost
+    at the start is infinite, the start is returned, without normal equations. `jacobian` is an
+    approximate Jacobian near the start.
     """
     return refine(
         iterate(candidate, series, noise_levels, start, max_iterations, jacobian),
@@ -86,8 +87,11 @@ def iterate_broyden(
 ) -> Estimate:
     """Return the result of damped steps with one difference Jacobian and Broyden updates.
 
-    The result has the updated Jacobian at its point. `nearby` is an estimate of a similar model
-    whose operating points are tried at the start.
+    The steps end after `max_iterations`, when one gains less than `MIN_GAIN_BROYDEN` (2 nats), or
+    when none lowers the cost. The result has the updated Jacobian at its point. If the cost at the
+    start is infinite, the start is returned. `nearby` is an estimate of a similar model whose
+    operating points are tried at the start; `jacobian` gives columns that are not computed by
+    differences.
     """
     return _iterate_from(
         candidate, series, noise_levels, start, max_iterations, jacobian, nearby
@@ -103,7 +107,10 @@ def iterate(
     jacobian: Jacobian | None = None,
     nearby: Estimate | None = None,
 ) -> Estimate:
-    """Return the same point as `iterate_broyden`, without an updated Jacobian at the end."""
+    """Return the same point as `iterate_broyden`, without an updated Jacobian at the end.
+
+    Normal equations and Jacobian of the result are None and empty, or those of an earlier point.
+    """
     return _iterate_from(
         candidate, series, noise_levels, start, max_iterations, jacobian, nearby
     ).estimate
@@ -133,8 +140,9 @@ def refine(
 ) -> Estimate:
     """Return a converged fit: new difference Jacobians alternate with damped steps.
 
-    It ends when the steps after a new Jacobian gain less than `MIN_GAIN_NEW_JACOBIAN`. An estimate
-    with infinite cost is returned unchanged.
+    It ends when the steps after a new Jacobian gain less than `MIN_GAIN_NEW_JACOBIAN` (1 nat), or
+    after `MAX_REFINEMENTS` (12). Steps end at a gain below `MIN_GAIN` or after `max_iterations`.
+    The result has normal equations. An estimate with infinite cost is returned unchanged.
     """
     if not _is_finite(estimate):
         return estimate
@@ -221,9 +229,11 @@ def iterate_with_jacobian(
 
     Columns that the similar model lacks are computed by differences at each step; Broyden updates
     of these failed for shafts of unequal stiffness, which start far from their optimum. The steps
-    end when one gains less than `MIN_ITERATION_GAIN`, or after some iterations less than a tenth of
-    the total. If no step is found at the initial damping, the estimate records the Jacobian as
-    exhausted.
+    end when one gains less than `MIN_ITERATION_GAIN` (3 nats), or, from iteration
+    `SCREENING_ITERATIONS` (8, or 4 for a single recording) on, less than `LATE_GAIN_FRACTION` (a
+    tenth) of the total. If no step is found from the initial damping, the estimate records
+    `jacobian` as exhausted; an estimate that is exhausted for it or has an infinite cost is
+    returned unchanged.
     """
     if not _is_finite(estimate) or estimate.exhausted_jacobian is jacobian:
         return estimate
@@ -248,7 +258,11 @@ def iterate_with_jacobian(
 
 
 def refresh_gains(estimate: Estimate, series: Sequence[SampledRecording]) -> Estimate:
-    """Return the estimate with Kalman gains for its own operating points, if these cost less."""
+    """Return the estimate with Kalman gains for its own operating points, if it then costs less.
+
+    Otherwise, also at equal cost, the estimate itself is returned. A refreshed one has no normal
+    equations and no Jacobian.
+    """
     refreshed = evaluate(
         estimate.candidate, series, estimate.noise_levels, estimate.point, estimate.prediction
     )
@@ -262,11 +276,12 @@ def search_damping(
     per_recording_only: bool = False,
     min_gain: float = MIN_PREDICTED_GAIN,
 ) -> tuple[Estimate | None, float]:
-    """Return an estimate of lower cost after one damped step, and the next damping.
+    """Return an estimate of lower cost after one damped step, and the damping for the next one.
 
-    The damping grows by 10 until a step lowers the cost, and is divided by 10 after success. Steps
-    with a predicted gain below `min_gain` [nats] are not evaluated. The estimate is None if the
-    damping reaches `MAX_DAMPING`. With `per_recording_only` only coordinates per recording move.
+    The damping grows by 10 until a step lowers the cost, and is divided by 10 after success (at
+    least 1e-9). Steps with a predicted gain below `min_gain` [nats] are not evaluated. The estimate
+    is None if the damping reaches `MAX_DAMPING` (1e5). A result keeps the normal equations and the
+    Jacobian of the old point. With `per_recording_only` only coordinates per recording move.
     """
     assert estimate.normal_equations is not None
     while damping < MAX_DAMPING:

@@ -44,9 +44,10 @@ def linearise(
 ) -> LinearModel | None:
     """Return the linear model over one sample near `states` (states,) in a mode under `inputs`.
 
-    The derivatives are central differences with the steps `state_steps` (states,). `c` refers to
-    the states at the end of the sample: the outputs' derivatives times the pseudoinverse of `phi`.
-    The result is None if a derivative exceeds `MAX_QUOTIENT`.
+    The derivatives are central differences with the steps `state_steps` (states,), at least
+    `MIN_STATE_STEP`, and `INPUT_STEP` times the inputs, at least `INPUT_STEP`. `c` refers to the
+    states at the end of the sample: the outputs' derivatives times the pseudoinverse of `phi`. The
+    result is None if a derivative of a state reaches `MAX_QUOTIENT` (1e12) or is NaN.
     """
     steps, pushes = (
         np.maximum(state_steps, MIN_STATE_STEP),

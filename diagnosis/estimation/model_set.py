@@ -48,15 +48,16 @@ class ModelSet:
     def load_or_fit(
         self, label: str, candidate: Candidate, dependencies: Sequence[object], fit: FitFunction
     ) -> Estimate:
-        """Return a fit to the recordings, from the fit cache or computed by `fit`.
+        """Return a fit to the recordings of the model set, from its fit cache or computed by `fit`.
 
-        `label`, the candidate, the recordings and `dependencies` determine the key.
+        `label`, the candidate, the recordings and `dependencies` determine the key; see
+        `FitCache.load_or_fit`.
         """
         return self.fit_cache.load_or_fit(label, candidate, self.series, dependencies, fit)
 
     @property
     def period(self) -> Fraction:
-        """The time [s] between samples."""
+        """The time [s] between samples of the first recording, which all recordings have."""
         return self.series[0].period
 
     def compile_candidate(
@@ -64,11 +65,10 @@ class ModelSet:
         placed_effects: Sequence[PlacedEffect],
         disturbances: Sequence[PlacedEffect] | None = None,
     ) -> Candidate:
-        """Return the base with effects and disturbances, compiled once per combination.
+        """Return the base with effects and disturbances, compiled once per combination and order.
 
-        Raises SpecError.
-
-        Without `disturbances` those of the model set are used.
+        Without `disturbances` those of the model set are used; an empty sequence means none. Raises
+        SpecError if they cannot be combined.
         """
         disturbances = self.disturbances if disturbances is None else disturbances
         key = (
@@ -87,7 +87,12 @@ class ModelSet:
         return self._compiled[key]
 
     def applicable_effects(self) -> Iterator[PlacedEffect]:
-        """Yield every effect at every place where the recordings could show it."""
+        """Yield every effect at every place where the recordings could show it.
+
+        `EXCLUDED_EFFECTS` are left out, as are inputs that are constant in every recording, outputs
+        that are not compared, and balances of other units than forces or torques. The order is that
+        of `effects`, then of the places. Whether the model compiles with an effect is not checked.
+        """
         candidates = (one for one in self.effects if one.name not in EXCLUDED_EFFECTS)
         for effect in candidates:
             for placed_effect in find_placements(self.document, effect):
@@ -95,7 +100,10 @@ class ModelSet:
                     yield placed_effect
 
     def try_compile(self, placed_effects: Sequence[PlacedEffect]) -> Candidate | None:
-        """Return the base with effects, compiled, or None if they cannot be combined."""
+        """Return the base with effects, or None if they cannot be combined (SpecError).
+
+        The disturbances are those of the model set. Other errors are raised.
+        """
         try:
             return self.compile_candidate(placed_effects)
         except SpecError:
@@ -104,7 +112,10 @@ class ModelSet:
     def try_compile_all(
         self, combinations: Sequence[Sequence[PlacedEffect]]
     ) -> list[Candidate | None]:
-        """Return `try_compile` of each combination, compiled in parallel threads."""
+        """Return `try_compile` of each combination in their order, compiled in parallel threads.
+
+        A combination that cannot be compiled is None.
+        """
         with ThreadPoolExecutor(os.cpu_count()) as compilers:
             return list(compilers.map(self.try_compile, combinations))
 
@@ -129,7 +140,10 @@ class ModelSet:
 
 
 def balance_disturbances(document: Document, automaton: Automaton) -> tuple[PlacedEffect, ...]:
-    """Return a disturbance for each balance of forces or torques, in the order of the states."""
+    """Return a disturbance for each state with a balance of forces or torques, in their order.
+
+    The balance must match the place of a disturbance effect and be in units of N or N*m.
+    """
     return tuple(
         disturbance_effect("balance", name)
         for name in automaton.states

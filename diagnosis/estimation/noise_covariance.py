@@ -43,9 +43,10 @@ def fit_noise_covariance(
 ) -> Estimate:
     """Return a fit with parameters and noise levels at their joint optimum.
 
-    Only disturbances in `units` [SI] are estimated, up to `max_levels` (in units, 3 by default).
-    With the output-error criterion, or if the joint fit is not better, only the parameters are
-    refined.
+    Only disturbances in `units` [SI] are estimated, from `MIN_LEVEL` up to `max_levels` (in units,
+    `MAX_LEVEL` = 3 by default), and the noise of outputs and inputs within `MAX_NOISE_RATIO` (2.5)
+    of the measured noise. With the output-error criterion, or if the joint fit diverges or is not
+    better, only the parameters are refined. The result has no noise parameters.
     """
     if estimate.noise_levels.is_output_error or not np.isfinite(estimate.cost):
         return refine(estimate, series)

@@ -43,8 +43,10 @@ def disturbance_units(
 ) -> dict[str, float]:
     """Return the unit [SI] of each disturbance state, by name.
 
-    One unit changes some output by its measured noise after `UNIT_RESPONSE_TIME`, by the model
-    linearised at the start of the first recording. Raises ValueError if that cannot be linearised.
+    One unit changes some output by its measured noise after `UNIT_RESPONSE_TIME` (0.2 s), by the
+    model linearised at the start of the first recording (at most 1e12 for a disturbance without
+    response). `start` are values [SI] of parameters. Raises ValueError if the model cannot be
+    linearised there.
     """
     output_noise = measured_noise_levels(series, {}).outputs
     mode, operating_point = next(iter(operating_points(candidate, series, None).items()))
@@ -68,8 +70,10 @@ def line_search_noise(
 ) -> Estimate:
     """Return an estimate with noise levels improved one at a time, its parameters fixed.
 
-    The levels of disturbances in `units` move along `LEVELS`, then the noise of inputs and of each
-    output changes by factors. A change is accepted if it gains more than `MIN_GAIN`.
+    The levels of disturbances in `units` move along `LEVELS`, up first, then down, from the nearest
+    one; then the noise of all inputs and of each output changes by factors of `NOISE_FACTOR` (1.5),
+    within `MAX_NOISE_RATIO` of the measured noise. A change is accepted if it gains more than
+    `MIN_GAIN` (2 nats).
     """
     for name in units:
         level_index = _nearest_level(estimate.noise_levels.process.get(name, 0.0), units[name])
@@ -144,8 +148,10 @@ def fit_with_noise(
 ) -> Estimate:
     """Return parameters and noise levels estimated together from one start.
 
-    The steps are: parameters with fixed levels, a line search of levels, and a joint fit.
-    `jacobian` is an approximate Jacobian near the start, `nearby` an estimate of a similar model.
+    The steps are: parameters with fixed levels (`iterate`), a line search of levels, and a joint
+    fit (`fit_noise_covariance`). `units` are the disturbances whose level is estimated. `jacobian`
+    is an approximate Jacobian near the start, `nearby` an estimate of a similar model. The cost is
+    infinite if the model diverges at the start.
     """
     now = iterate(candidate, series, noise_levels, start, jacobian=jacobian, nearby=nearby)
     return fit_noise_covariance(line_search_noise(now, series, units), series, units)
@@ -164,8 +170,9 @@ def fit_candidate(
     """Return the better of fits that start with a small and with the given disturbance level.
 
     A model must explain data without disturbances; a fit that starts with a large level does not
-    get there. The second fit is skipped if the given levels are small, or if the first cost is
-    below `known_cost` [nats].
+    get there. The small level is `SMALL_LEVEL` (0.1) units. The second fit is skipped if no given
+    level in `units` is larger, or if the first cost is below `known_cost` [nats]. At equal cost the
+    first fit is taken.
     """
     small_process = {
         **noise_levels.process,
@@ -187,7 +194,9 @@ def fit_base(
 ) -> Estimate:
     """Return the base fitted once to recordings from its declared values, with Huber limits.
 
-    The limits are `HUBER_STDS` times the robust standard deviation of its innovations.
+    The fit itself has no limits and starts at a level of one unit of each disturbance. The limits
+    of the result are `HUBER_STDS` (4) times the robust standard deviation of its innovations; its
+    cost and prediction are not computed again with them.
     """
     first = fit_with_noise(candidate, series, measured_noise_levels(series, units), {}, units)
     limits = HUBER_STDS * np.maximum(first.prediction.robust_std(), 1e-12)
@@ -199,9 +208,10 @@ def fit_base(
 def recalibrate(
     first: Estimate, series: Sequence[SampledRecording], units: Mapping[str, float]
 ) -> Estimate:
-    """Return the best of fits of the base from increasing disturbance levels.
+    """Return the best of fits of the base from the levels `INITIAL_LEVELS` (0.1, 0.3, 1 units).
 
-    The fits start from the best point so far and end when two in a row have the same cost.
+    Each fit starts from the point of the best one so far, at first that of `first`. The fits end
+    when two in a row differ in cost by less than `MIN_GAIN` (2 nats). `first` is no result.
     """
     fits: list[Estimate] = []
     for level in INITIAL_LEVELS:

@@ -33,18 +33,21 @@ class NormalEquations:
     fold: NDArray[np.int64]
 
     def without_fold(self, fold: int) -> NormalEquations:
-        """Return the equations of all blocks outside a fold."""
+        """Return the equations of all blocks that are not in a fold."""
         kept = self.fold != fold
         return NormalEquations(self.a[kept], self.g[kept], self.own, self.of[kept], self.fold[kept])
 
     @cached_property
     def total(self) -> Sums:
-        """The sums over all blocks."""
+        """The sums of `a` (n, n) and `g` (n,) over all blocks."""
         return self.a.sum(axis=0), self.g.sum(axis=0)
 
     @cached_property
     def by_recording(self) -> dict[int, Sums]:
-        """The sums over the blocks of each recording; empty without coordinates per recording."""
+        """The sums of `a` and `g` over the blocks of each recording, by its index.
+
+        Empty without coordinates per recording; a recording without blocks is left out.
+        """
         if not self.own.any():
             return {}
         here = {int(r): self.of == r for r in np.unique(self.of)}
@@ -57,7 +60,8 @@ def normal_equations_of(
     """Return the normal equations of a prediction for all coordinates of a candidate.
 
     The weights are the inverse mean squares of outputs, divided by |e| / limit beyond the Huber
-    limit. Unknown innovations have the weight 0.
+    limit. Unknown innovations have the weight 0. There is one equation for each cross-validation
+    block of the prediction. `jacobian` must have every coordinate of the candidate.
     """
     blocks, innovation = prediction.blocks, prediction.stacked
     known = np.isfinite(innovation)
@@ -112,8 +116,9 @@ def damped_step(
 def predicted_gain(
     candidate: Candidate, start: ParameterVector, normal: NormalEquations, end: ParameterVector
 ) -> float:
-    """Return the decrease of the cost [nats] from `start` to `end` by the quadratic model,
-    with priors.
+    """Return the decrease of the cost [nats] from `start` to `end` by the quadratic model.
+
+    The decrease of the prior cost is included; the result is negative if the cost increases.
     """
     step = np.where(
         normal.own, (end.per_recording - start.per_recording)[normal.of], end.shared - start.shared
@@ -153,8 +158,9 @@ def _solve_step(
 
 
 def solve(matrix: Reals, right: Reals) -> Reals:
-    """Return the solution of a linear system,
-    or its minimum-norm solution if the matrix is singular.
+    """Return the solution of a linear system, of least norm if the matrix is exactly singular.
+
+    The singular case is a least-squares solution. `right` may have several columns.
     """
     try:
         return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)

@@ -38,10 +38,11 @@ def linearise_modes(
     calibration_page: Reals,
     prediction: PredictionResult | None,
 ) -> ModeModels:
-    """Return the linearised candidate in each mode at its operating point, the longest stay first.
+    """Return the linearised candidate and the median dwell time of each mode, longest stay first.
 
-    Modes in which the linearisation is invalid are left out. The result is cached by the page and
-    the identity of the other arguments, which the entry holds.
+    The points are those of `operating_points`. Modes in which the linearisation is invalid are left
+    out. The last `CACHE_SIZE` (4) results are cached by the page and the identity of the predictor,
+    the compiled model, the prediction and the recordings, which the entry holds.
     """
     held = candidate.predictor, candidate.compiled, prediction, *series
     key = calibration_page.tobytes(), *map(id, held)
@@ -73,8 +74,9 @@ def _compute_linearised_modes(
 def linearise_near(
     candidate: Candidate, calibration_page: Reals, mode: int, states: Reals, inputs: Reals
 ) -> LinearModel | None:
-    """Return the candidate linearised over one sample in a mode near a point,
-    or None if invalid.
+    """Return the candidate linearised over one sample in a mode near a point; None if invalid.
+
+    The steps of the states are `STATE_STEP_FRACTION` of their ranges; see `linearise`.
     """
     substeps, sizes = candidate.compiled.substeps, STATE_STEP_FRACTION * candidate.state_ranges
     return linearise(candidate.predictor, calibration_page, mode, substeps, states, inputs, sizes)
@@ -94,9 +96,11 @@ def operating_points(
 ) -> dict[int, OperatingPoint]:
     """Return an operating point of each mode in a prediction, the mode with the longest stay first.
 
-    It lies in the longest stay of the mode, where the first output is largest, because friction is
-    steep near standstill. Modes with only short stays are left out. Without a prediction the result
-    is the start of the first recording.
+    It lies in the longest stay of the mode, without its first and last fifth, at the sample where
+    the magnitude of the first measured output is largest, because friction is steep near
+    standstill. Modes whose stays are all shorter than `MIN_DWELL_SAMPLES` (5) are left out. Without
+    a prediction the result is the start of the first recording in its mode, at declared parameter
+    values.
     """
     if prediction is None:
         return _initial_operating_point(candidate, series[0])

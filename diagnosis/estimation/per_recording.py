@@ -24,8 +24,9 @@ MAX_ITERATIONS = 5
 def reestimate_per_recording(model: Estimate, series: Sequence[SampledRecording]) -> Estimate:
     """Return a model for other recordings, with its own Kalman gains and shared parameters.
 
-    Only parameters per recording are fitted, from the better of the shared vector and their
-    declared starts. Without such parameters, or if the cost is infinite, nothing is fitted.
+    Only parameters per recording are fitted, by at most `MAX_ITERATIONS` (5) steps, from the better
+    of the shared vector and their declared starts (`restart_phases`). Without such parameters, or
+    if the cost is infinite, nothing is fitted: each recording has the shared vector.
     """
     shared = model.point.shared
     now = evaluate_with_gains_of(
@@ -52,11 +53,13 @@ def reestimate_per_recording(model: Estimate, series: Sequence[SampledRecording]
 
 
 def restart_phases(estimate: Estimate, series: Sequence[SampledRecording]) -> Estimate:
-    """Return an estimate with each parameter per recording at the best of its starts, if that is
-    better.
+    """Return an estimate with each parameter per recording at its start of least cost, if better.
 
-    A phase that was fitted while other parameters were wrong may be at a local optimum. The starts
-    of each parameter are compared for each recording by the sum of squared innovations.
+    Only parameters with several starts are tried, one after the other; the starts are compared for
+    each recording by the sum of squared innovations over the variances, with the estimate's gains.
+    The result is evaluated with new gains. Without such parameters, or if the cost is infinite, the
+    estimate is returned. A phase that was fitted while other parameters were wrong may be at a
+    local optimum.
     """
     uncertain = estimate.candidate.free_parameters
     own = [k for k, one in enumerate(uncertain) if one.per_recording and len(one.starts) > 1]
