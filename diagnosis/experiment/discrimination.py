@@ -51,11 +51,19 @@ class ExperimentPlan:
 
     @property
     def is_discriminating(self) -> bool:
-        """Whether the best manoeuvre separates the candidates."""
+        """Whether the first option reaches `MIN_LOG_BAYES_FACTOR` (20 nats).
+
+        False without options.
+        """
         return bool(self.options) and self.options[0].log_bayes_factor >= MIN_LOG_BAYES_FACTOR
 
     def format_sentence(self) -> str:
-        """Return in one sentence what to record."""
+        """Return in one sentence what to record.
+
+        It is "to tell a from b and c, record: X (45 nats expected, 20 are enough)" with the names
+        of the candidates and the first manoeuvre X. If it does not discriminate, the sentence is
+        "no manoeuvre that was tried would tell a from b and c".
+        """
         names = " from ".join((self.names[0], " and ".join(self.names[1:])))
         if not self.is_discriminating:
             return f"no manoeuvre that was tried would tell {names}"
@@ -69,10 +77,11 @@ class ExperimentPlan:
 def plan_experiment(
     model_set: ModelSet, candidates: Sequence[tuple[str, Estimate]]
 ) -> ExperimentPlan | None:
-    """Return the plan for the first three fitted candidates.
+    """Return the plan for the first `MAX_CANDIDATES` (3) of the named, fitted candidates.
 
-    Manoeuvres in which a candidate diverges are left out. The result is None for fewer than two
-    candidates or without a manoeuvre.
+    The options are the manoeuvres for the model set in descending order of the smallest expected
+    log Bayes factor of all ordered pairs. Manoeuvres in which a candidate diverges are left out.
+    The result is None for fewer than two candidates or without a manoeuvre.
     """
     some = list(candidates)[:MAX_CANDIDATES]
     if len(some) < 2:

@@ -33,10 +33,12 @@ class Manoeuvre:
 
 
 def manoeuvres_for(model_set: ModelSet) -> list[Manoeuvre]:
-    """Return the manoeuvres for the driving input of a model set; none if no force or torque
-    varies.
+    """Return the manoeuvres for the driving input of a model set, in the order of the file.
 
-    The driving input is the first one with both signs. Manoeuvres with a brake need a second force.
+    The file is `manoeuvres.yaml`. The driving input is the first varying force or torque with both
+    signs in the recordings, or the first varying one if none has; the brake is the first other
+    varying one. Manoeuvres with a brake are left out without one. The result is empty if no force
+    or torque varies. Amplitudes are scaled to the largest recorded magnitude of an input.
     """
     forces = [name for name in model_set.automaton.inputs if _is_force(model_set, name)]
     names = list(model_set.automaton.inputs)
