@@ -21,8 +21,10 @@ DISTURBANCE_KIND_BY_SECTION = {"flow": "balance", "elements": "element", "output
 def acting_rms(model_set: ModelSet, section: str, place: str, model: Estimate) -> float:
     """Return the root mean square [SI] of what acts at a place; 0 if it cannot be determined.
 
-    For a balance this is its inertia times the rate, for an element its elastic torque (stiffness
-    times twist without the gap), for an output the standard deviation of the measurements.
+    For a balance ("flow") this is its inertia times the rate of the predicted state, for an element
+    its elastic torque (stiffness times twist without the gap), both after the burn-in; for an
+    output the standard deviation of the measurements, NaN excluded. It is 0 if the inertia or
+    stiffness is no single parameter, or the rate or twist no state.
     """
     if section == "outputs":
         column = model_set.output_names.index(place)
@@ -50,15 +52,20 @@ def acting_rms(model_set: ModelSet, section: str, place: str, model: Estimate) -
 
 
 def disturbance_unit(model_set: ModelSet, section: str, place: str) -> str:
-    """Return the unit of a disturbance at a place; "" if none can be placed there."""
+    """Return the unit of a disturbance at a place: of an output's signal, else of a force.
+
+    The result is "" if no disturbance can be placed there.
+    """
     return place_bindings(model_set, section, place).get(
         "unit" if section == "outputs" else "force", ""
     )
 
 
 def place_bindings(model_set: ModelSet, section: str, place: str) -> dict[str, str]:
-    """Return the names and texts that a disturbance effect binds at a place;
-    empty if it does not match.
+    """Return the names and texts that a disturbance effect binds at a place, by placeholder.
+
+    Only bindings that are strings are included, such as `inertia` or `twist`. Empty if the section
+    has no disturbance or the place does not match.
     """
     kind = DISTURBANCE_KIND_BY_SECTION.get(section)
     if kind is None:

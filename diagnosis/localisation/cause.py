@@ -41,11 +41,13 @@ squares of a disturbance that counts as most of it.
 
 
 def attribute_causes(model_set: ModelSet, location: Location) -> Iterator[str]:
-    """Yield the paths of inputs or elements that act in a location's balance and fit its
-    disturbance.
+    """Yield the paths of inputs or elements of a location's balance that fit its disturbance.
 
-    Elements follow for a disturbance that correlates with the acceleration, inputs for a ripple,
-    and inputs of both signs for a constant; else nothing is yielded.
+    All elements (`elements.name`) of the balance follow for a large disturbance that correlates
+    with the acceleration; else, for a constant, the inputs (`inputs.name`) that take both signs;
+    else, for a ripple (an order of the angle as strongest correlate), all inputs; else nothing. The
+    limits are `MASS_CORRELATION`, `MASS_FRACTION`, `CONSTANT_FRACTION`, `CONSTANT_MARGIN` and
+    `RIPPLE_CORRELATION`. The order is that of the automaton.
     """
     paths = [f"inputs.{name}" for name in model_set.automaton.inputs]
     if _follows_acceleration(model_set, location):
@@ -60,7 +62,9 @@ def attribute_causes(model_set: ModelSet, location: Location) -> Iterator[str]:
 def is_inactive(model_set: ModelSet, location: Location, path: str) -> bool:
     """Return whether an input is near 0 during most of a disturbance, so it cannot be its cause.
 
-    `path` is `section.name`; the answer is False for other sections and unknown disturbances.
+    Near 0 is below `INACTIVE_AMPLITUDE` (2 %) of its largest magnitude, and most is more than
+    `INACTIVE_ENERGY` (half) of the squares of the disturbance. `path` is `section.name`; the result
+    is False for other sections than `inputs` and for a location without smoothed disturbances.
     """
     section, _, name = path.partition(".")
     if section != "inputs" or not location.disturbances:
@@ -78,8 +82,10 @@ def is_inactive(model_set: ModelSet, location: Location, path: str) -> bool:
 
 
 def balance_of(model_set: ModelSet, section: str, place: str) -> str:
-    """Return `flow.state` of the balance in which an input or an inertia acts,
-    else `section.place`.
+    """Return `flow.state` of the balance in which an input or inertia acts, else `section.place`.
+
+    An element with a `speed` acts in the balance of that speed; an input in the first balance with
+    a disturbance whose equation names it. Other places are returned unchanged.
     """
     element = model_set.automaton.elements.get(place)
     if section == "elements" and element is not None and "speed" in element.parts:

@@ -21,12 +21,13 @@ ORDERS = (1, 2, 3, 4, 6, 8, 12, 24)
 def find_correlates(
     model_set: ModelSet, free_model: Estimate, disturbances: Sequence[Reals]
 ) -> tuple[tuple[str, float], ...]:
-    """Return the features with which a disturbance correlates, and the correlations, strongest
-    first.
+    """Return the features with the strongest correlation with a disturbance, and the correlations.
 
-    For an order of an angle, whose phase differs between recordings, the value is the multiple
-    correlation with its sine and cosine. At most `MAX_CORRELATES` features are returned; constant
-    ones are left out.
+    At most `MAX_CORRELATES` (3) are returned, in descending order of their magnitude. Features are
+    states with a range (also their sign and square), inputs (also their magnitude and rate), the
+    time, the recording, and orders of angles. For an order, whose phase differs between recordings,
+    the value is the multiple correlation with its sine and cosine. Constant features are left out.
+    A disturbance is compared with the last samples of each recording.
     """
     target = [values - np.mean(values) for values in disturbances]
     correlations = []
@@ -48,8 +49,9 @@ def find_correlates(
 
 
 def order_features(rate: str) -> dict[str, int]:
-    """Return the names of features that are orders of the angle of a rate,
-    with their periods per turn.
+    """Return the names of features that are orders of the angle of a rate, with their orders.
+
+    A name is `order 3 of the angle of <rate>`; the orders (periods per turn) are `ORDERS`.
     """
     return {f"order {order} of the angle of {rate}": order for order in ORDERS}
 
@@ -111,7 +113,10 @@ def _order_angles(model_set: ModelSet, free_model: Estimate) -> dict[str, list[R
 
 
 def angle_rates(model_set: ModelSet) -> list[str]:
-    """Return the names of rates of angles that `places` and `elements` of a document declare."""
+    """Return the names under the key `angle_rate` in `places` and `elements` of a document.
+
+    Places come first, in the order of the document; a repeated name is dropped.
+    """
     rates = []
     for section in ("places", "elements"):
         node = model_set.document.root.get(section)

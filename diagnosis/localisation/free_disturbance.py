@@ -38,8 +38,12 @@ def free_disturbance(
 ) -> Estimate:
     """Return the model with the disturbance of `placed_effect` free and its parameters fitted.
 
-    With None all disturbances stay small. The fit starts from the parameters of the base and from
-    the declared ones, because the fit of a deficient base may be far off. It is cached.
+    It has the effects of the base; a disturbance that the model set lacks is added. The other
+    disturbances stay at `SMALL_LEVEL` (0.1 units), with None all of them; the free level is the
+    best of `WIDE_LEVELS` and `INITIAL_LEVEL`, then of `NEAR_LEVELS`. The fit starts from the better
+    one of the parameters of the base and the declared ones, because the fit of a deficient base may
+    be far off, and takes at most `MAX_ITERATIONS` (3) steps. It is stored in the fit cache. The
+    cost is infinite if the model diverges.
     """
     known = placed_effect is None or any(
         placed_effect.id == other.id for other in model_set.disturbances
@@ -82,7 +86,8 @@ def scan_level(
 ) -> Estimate:
     """Return the estimate with the best level of one disturbance among `levels`, parameters fixed.
 
-    The given estimate is one of the choices; it is returned for `name` None.
+    `levels` are in units of the disturbance. The given estimate is one of the choices and stays at
+    equal cost; it is returned for `name` None.
     """
     if name is None:
         return estimate
@@ -99,6 +104,9 @@ def scan_level(
 def with_disturbance_levels(
     noise_levels: NoiseLevels, units: Mapping[str, float], levels: Mapping[str, float]
 ) -> NoiseLevels:
-    """Return noise levels with the named disturbances set to levels in their units."""
+    """Return noise levels with the disturbances in `levels` set to their level times their unit.
+
+    All others stay. KeyError for a name without a unit.
+    """
     sizes = {name: level * units[name] for name, level in levels.items()}
     return dataclasses.replace(noise_levels, process={**noise_levels.process, **sizes})

@@ -41,7 +41,7 @@ class DisturbanceEstimate:
 
     @property
     def is_significant(self) -> NDArray[np.bool_]:
-        """The samples (samples,) at which the disturbance differs significantly from 0."""
+        """The mask (samples,) of values beyond `SIGNIFICANT_STDS` (3) standard deviations."""
         return np.abs(self.values) > SIGNIFICANT_STDS * self.stds
 
 
@@ -81,7 +81,10 @@ class Location:
 def location_of(
     model_set: ModelSet, section: str, placed_effect: PlacedEffect, free_model: Estimate
 ) -> Location:
-    """Return the location of a fit with a free disturbance; its gain is 0 until it is set."""
+    """Return the location of a fit with a free disturbance, from filtered (not smoothed) values.
+
+    The gain is 0 until it is set; windows and `disturbances` are empty.
+    """
     drifts = disturbances_of(
         model_set.series, free_model, placed_effect.qualified_name(DISTURBANCE_STATE)
     )
@@ -102,8 +105,8 @@ def location_of(
 def with_smoothed_disturbances(model_set: ModelSet, location: Location) -> Location:
     """Return a location with the smoothed disturbance over time and the values that follow from it.
 
-    A location without a free model, or with known disturbances, is returned unchanged. Raises
-    ValueError if the model is unstable in every mode.
+    These are those of `with_disturbances`. A location without a free model, or with known
+    disturbances, is returned unchanged. Raises ValueError if the model is unstable in every mode.
     """
     if location.free_model is None or location.disturbances:
         return location
@@ -122,10 +125,12 @@ def with_smoothed_disturbances(model_set: ModelSet, location: Location) -> Locat
 def with_disturbances(
     model_set: ModelSet, location: Location, disturbances: tuple[DisturbanceEstimate, ...]
 ) -> Location:
-    """Return a location with a disturbance over time, and the rms, windows, modes and correlates of
-    it.
+    """Return a location with a disturbance over time, and the values that follow from it.
 
-    The windows are the longest ones, at most `MAX_WINDOWS`.
+    These are rms, fraction, windows, modes and correlates. The windows are the longest ones first,
+    at most `MAX_WINDOWS` (12): samples beyond `SIGNIFICANT_STDS` nearer than `OSCILLATION_PERIOD`
+    (0.2 s) are merged, and windows shorter than half of it are dropped. The location must have a
+    free model.
     """
     assert location.free_model is not None
     values = [one.values for one in disturbances]
@@ -162,7 +167,10 @@ def _rms(values: Sequence[Reals]) -> float:
 def disturbances_of(
     series: Sequence[SampledRecording], free_model: Estimate, name: str
 ) -> list[Reals]:
-    """Return the filtered disturbance state [SI] in each recording after its burn-in (samples,)."""
+    """Return the filtered disturbance state `name` [SI] in each recording, (samples,) each.
+
+    The burn-in and the samples after a run diverged are left out.
+    """
     place = free_model.candidate.predictor.states.index(name)
     runs = zip(series, free_model.prediction.predictions, strict=True)
     return [run.states[burn_in_samples(one) : run.completed, place] for one, run in runs]

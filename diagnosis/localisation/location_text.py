@@ -29,7 +29,10 @@ MIN_CORRELATION = 0.3
 def format_location(locations: Sequence[Location], model_set: ModelSet) -> str:
     """Return one sentence on the first location, or `NO_LOCATION` if it has no gain.
 
-    An accepted location is described even without a gain.
+    It is `missing in the balance of w: 1.2 N*m rms (30 % of what accelerates it), ...`, followed by
+    the share of the main mode (if there are several), the two longest windows, and the strongest
+    correlate from `MIN_CORRELATION` (0.3) on. An accepted location is described even without a
+    gain.
     """
     best = locations[0] if locations else None
     if best is None or not (best.gain > 0.0 or best.is_accepted):

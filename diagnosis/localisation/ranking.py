@@ -27,8 +27,10 @@ ABSORBED_FRACTION = 0.3
 def localise(model_set: ModelSet, base: Estimate) -> tuple[Location, ...]:
     """Return the locations with a finite cost by descending gain, the first one smoothed over time.
 
-    The gain is relative to a fit with all disturbances small. The parameters are fitted anew at
-    each place, because those of the base are biased by what it lacks.
+    They are those of `disturbance_locations`, each with its disturbance alone free. The gain is
+    relative to a fit with all disturbances small (if that diverges, to the largest finite cost),
+    and may be negative. The parameters are fitted anew at each place, because those of the base are
+    biased by what it lacks.
     """
     free = [
         (section, placed_effect, free_disturbance(model_set, base, placed_effect))
@@ -51,9 +53,9 @@ def localise(model_set: ModelSet, base: Estimate) -> tuple[Location, ...]:
 def unexplained_gain(model_set: ModelSet, base: Estimate, locations: Sequence[Location]) -> float:
     """Return the effective log-likelihood gain [nats] of the best location.
 
-    The part that the base absorbs with its own small disturbances is weighted by
-    `ABSORBED_FRACTION`, because every model has some disturbance. The result is divided by the
-    integrated autocorrelation of the innovations.
+    It is the largest gain (0 without locations). The part that the base absorbs with its own small
+    disturbances is weighted by `ABSORBED_FRACTION` (0.3), because every model has some disturbance.
+    The result is divided by the integrated autocorrelation of the innovations.
     """
     gain = max((location.gain for location in locations), default=0.0)
     taken_up = min(max(0.0, free_disturbance(model_set, base).cost - base.cost), gain)
@@ -63,8 +65,10 @@ def unexplained_gain(model_set: ModelSet, base: Estimate, locations: Sequence[Lo
 
 
 def disturbance_locations(model_set: ModelSet) -> list[tuple[str, PlacedEffect]]:
-    """Return section and disturbance for each balance of forces,
-    elastic element and compared output.
+    """Return section and disturbance of each place where a disturbance is tried.
+
+    These are the balances that have one in the model set ("flow"), then the elastic elements
+    ("elements"), then the compared outputs ("outputs").
     """
     locations = [("flow", placed_effect) for placed_effect in model_set.disturbances]
     elements = model_set.document.root.get("elements")
@@ -82,8 +86,9 @@ def rank_accepted_first(
 ) -> tuple[Location, ...]:
     """Return locations with those of accepted effects (`paths`) first, in the order of the paths.
 
-    An accepted path takes over the location with its own path or with that of its balance; the
-    first one is smoothed.
+    An accepted path takes over the location with its own path or with that of its balance, under
+    its own section and name, marked as accepted; without one it is new, with gain 0. The very first
+    one is smoothed. The other locations follow in their order, without those of `paths`.
     """
     by_path = {location.path: location for location in locations}
     first: list[Location] = []
@@ -99,12 +104,12 @@ def rank_accepted_first(
 def rank_causes_first(
     locations: Sequence[Location], nearest_paths: Iterable[str], model_set: ModelSet
 ) -> tuple[Location, ...]:
-    """Return locations of an unknown cause, led by an input or element that acts in the first
-    balance.
+    """Return locations of an unknown cause, led by an input or element of the first balance.
 
-    The cause follows from the time course of the disturbance, else from the first of
-    `nearest_paths` (best effects first) that acts in that balance and is not inactive. Without a
-    cause the order stays.
+    The cause is the first path of `attribute_causes`, else the first of `nearest_paths` (best
+    effects first) that acts in that balance and is not inactive. A copy of the first location under
+    the path of the cause is put before all locations. Without a cause, or if it is the balance
+    itself, the locations stay as they are.
     """
     if not locations:
         return ()

@@ -66,7 +66,8 @@ class _MeasurementUpdate:
 def smooth_states(estimate: Estimate, series: Sequence[SampledRecording]) -> list[SmoothedStates]:
     """Return the smoothed states of each recording to which a model was fitted.
 
-    The standard deviations are scaled up where innovations are larger than their variances predict.
+    The standard deviations are multiplied by the root of the mean normalised square of innovations
+    over `AVERAGING_TIME` (1 s), where that exceeds 1. Samples after a run diverged are left out.
     Raises ValueError if the model is unstable in every mode.
     """
     candidate, noise_levels = estimate.candidate, estimate.noise_levels
@@ -127,7 +128,9 @@ def smooth_deviations(
     """Return smoothed deviations from the run, their standard deviations, and normalised squares.
 
     The first two have the shape (samples, recordings, states), the last one (samples, outputs,
-    recordings). `initial_std` (states,) and `noise_variances` (outputs,) are those of the filter.
+    recordings), NaN where an innovation is unknown. `initial_std` (states,) are the standard
+    deviations of the states at the start, `noise_variances` (outputs,) those of the measurements.
+    Deviations are from the run before the observer's own correction.
     """
     before, covariances, corrections = _forward_pass(data, initial_std, noise_variances)
     after, spread = _backward_pass(data, before, covariances, corrections)
