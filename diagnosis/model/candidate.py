@@ -59,17 +59,17 @@ class Candidate:
 
     @property
     def disturbance_states(self) -> tuple[str, ...]:
-        """The names of the disturbance states."""
+        """The names of the disturbance states, in the order of the disturbances."""
         return self.compiled.drifts
 
     @cached_property
     def state_ranges(self) -> Reals:
-        """The width of the declared range of each state (states,), 1 if it has no range."""
+        """The width (high - low, SI) of the range of each state (states,), 1 if it has no range."""
         return np.array(self.compiled.spans)
 
     @cached_property
     def is_effect_state(self) -> NDArray[np.bool_]:
-        """The mask (states,) of states that placed effects add."""
+        """The mask (states,) of states that placed effects add (not those of disturbances)."""
         return np.array(self.compiled.brought, dtype=np.bool_)
 
     @cached_property
@@ -87,7 +87,8 @@ class Candidate:
         """Return the calibration page (tunables,) for one recording.
 
         It holds `values` [SI] by name, the defaults of other tunables, and the initial values of
-        compared states from the first measurements of the recording.
+        compared states from the first measurements of the recording. Names that are no tunables are
+        ignored.
         """
         return np.asarray(
             self.calibration_pages([values], series.first_measured[np.newaxis])[0], dtype=np.float64
@@ -96,12 +97,11 @@ class Candidate:
     def calibration_pages(
         self, values: Sequence[Mapping[str, float]], first_measured: Reals
     ) -> Reals:
-        """Return the calibration page for each recording (recordings, tunables) from its values
-        [SI].
+        """Return the calibration pages (recordings, tunables) of the values [SI] of recordings.
 
-        `first_measured` (recordings, outputs) gives the initial values of compared states; a NaN
-        keeps the value of the page. Values that are the same object for all recordings are
-        converted once.
+        Other tunables have their defaults; names that are no tunables are ignored. `first_measured`
+        (recordings, outputs) gives the initial values of compared states; a NaN keeps the value of
+        the page. Values that are the same object for all recordings are converted once.
         """
         is_shared = all(own is values[0] for own in values)
         rows = [
@@ -146,9 +146,10 @@ def compile_candidate(
 ) -> Candidate:
     """Return the base with placed effects and disturbances, compiled for a sample period [s].
 
-    A compiled model with the same sources is read from the cache. Only the parameters of
-    `placed_effects` become free parameters of effects; `disturbances` add disturbance states.
-    Raises SpecError, and an error of the tool chain if no C compiler works.
+    A compiled model with the same sources is read from the compile cache, otherwise it is built and
+    stored there. The names that `placed_effects` add get the wide prior of effects; `disturbances`
+    add disturbance states. Initial values of states among `output_names` become tunable. Raises
+    SpecError, and MissingToolError or BuildError if no C compiler works.
     """
     all_layers = [*placed_effects, *disturbances]
     parts = [

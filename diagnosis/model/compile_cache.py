@@ -61,7 +61,11 @@ class CompiledModel:
 
 
 def cache_key(*parts: str) -> str:
-    """Return the SHA-256 key (hex) of texts together with the code that compiles candidates."""
+    """Return the SHA-256 key (hex) of texts and of the code that compiles candidates.
+
+    The order of the texts counts. The code is that of `language`, `codegen` and
+    `COMPILATION_MODULES`.
+    """
     digest = hashlib.sha256(code_digest(COMPILATION_MODULES).encode())
     for part in parts:
         digest.update(part.encode() + b"\\0")
@@ -69,7 +73,11 @@ def cache_key(*parts: str) -> str:
 
 
 def node_text(node: YamlNode | None) -> str:
-    """Return a document tree as one line of text without positions; empty for None."""
+    """Return a document tree as one line of text without positions; "" for None.
+
+    Scalars are JSON strings, sequences `[a,b]` and mappings `{"key":value}` in the order of the
+    document.
+    """
     if isinstance(node, ScalarNode):
         return json.dumps(node.text)
     if isinstance(node, SequenceNode):
@@ -84,8 +92,10 @@ def load_or_compile(
 ) -> tuple[CompiledModel, Path]:
     """Return the metadata and the library path of a key, from the cache or compiled and stored now.
 
-    An entry whose files are unreadable or whose library does not match its digest is compiled
-    again.
+    The files are `<key>.json` and `<key>.so` in the user's cache folder, or in a temporary folder
+    if there is none. An entry whose files are unreadable or whose library does not match its digest
+    is compiled again. Raises OSError if the files cannot be written, and what `compile_model`
+    raises.
     """
     folder = _cache_folder()
     recipe_path, library = folder / f"{key}.json", folder / f"{key}.so"
@@ -113,8 +123,9 @@ def _cache_folder() -> Path:
 def code_digest(patterns: tuple[str, ...] = ("*",)) -> str:
     """Return the SHA-256 digest (hex) of the source files on which compiled models and fits depend.
 
-    It covers all files of `language` and `codegen`, and the files of `diagnosis` whose stem matches
-    one of `patterns`.
+    It covers all files (py, jinja, yaml, lark) of `language` and `codegen`, and the files of
+    `diagnosis` whose stem matches one of the glob `patterns` (all by default). It is computed once
+    per process.
     """
     digest = hashlib.sha256()
     files = [
@@ -161,7 +172,8 @@ def _from_json(data: dict[str, Any]) -> CompiledModel:
 def write_atomically(path: Path, data: bytes) -> None:
     """Write a file through a temporary file in its folder, so that no reader sees a part of it.
 
-    Raises OSError; the temporary file is then removed.
+    An existing file is replaced; the file gets mode 0700. Raises OSError (also if the folder is
+    missing); the temporary file is then removed.
     """
     handle, name = tempfile.mkstemp(dir=path.parent)
     try:

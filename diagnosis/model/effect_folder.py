@@ -18,9 +18,10 @@ from language.text.document import Document
 
 
 def load_effects(folder: Path) -> tuple[Effect, ...]:
-    """Return the effects of a folder, sorted by file name.
+    """Return the effects of the `*.yaml` files directly in a folder, sorted by file name.
 
-    Raises ValueError if there is none, and SpecError if a file is invalid or a name repeats.
+    Raises ValueError if there is none (or no folder), and SpecError if a file is invalid or two
+    effects have the same name.
     """
     effects = read_effects(folder)
     if not effects:
@@ -40,7 +41,8 @@ def explain_unplaceable(
 ) -> Iterator[str]:
     """Yield a message for each effect that cannot be placed anywhere on an expanded automaton.
 
-    The message gives the error at the first place, or says that no place matches.
+    It is "effect `name` is not tried: ..." with the first error at the first matching place, or "it
+    fits no place of `automaton`". An effect that is valid at one place at least gives no message.
     """
     for effect in effects:
         placed_effects = find_placements(document, effect)

@@ -36,7 +36,10 @@ class EffectDescription:
 
 
 def library_effects(project: Project) -> tuple[Effect, ...]:
-    """Return the effects of a project and the shipped ones, sorted by name. Raises SpecError."""
+    """Return the effects of a project and the shipped ones, sorted by name.
+
+    Raises SpecError with the problems of all files if one is invalid.
+    """
     span = Span(Source("effects"), 1, 1)
     problems = Problems()
     found = [
@@ -52,7 +55,8 @@ def describe_effect(
 ) -> EffectDescription:
     """Return the description of an effect, with its places if an expanded document is given.
 
-    Places at which the resulting automaton would be invalid are left out.
+    Places at which the resulting automaton would be invalid are left out. Places and changes are
+    empty unless both `document` and `project` are given.
     """
     if document is None or project is None:
         return EffectDescription(effect, _defining_lines(effect.body))
@@ -92,7 +96,10 @@ def _defining_lines(body: MappingNode) -> tuple[str, ...]:
 
 
 def format_place_kinds(effect: Effect) -> str:
-    """Return in words the kinds of place to which an effect applies, joined by ", or "."""
+    """Return in words the kinds of place to which an effect applies, joined by ", or ".
+
+    An example is "the balance of a speed in N*m, or an elastic element that has gap".
+    """
     return ", or ".join(_format_place_kind(fit) for fit in effect.place_patterns)
 
 

@@ -58,10 +58,13 @@ def simulate_signature(
     placed_effect: PlacedEffect,
     step: tuple[str, str] | None = None,
 ) -> Signature:
-    """Return the simulations of an expanded base with and without an effect.
+    """Return the simulations of an expanded base with and without an effect, over `HORIZON` (4 s).
 
     `step` is an input and its height with unit; by default the input of the effect's place, or the
-    first input without a default. Raises SpecError, and ValueError if the base has no such input.
+    first input without a default, or the first one, by `DEFAULT_STEP_HEIGHTS`. The input steps to
+    the negative height at 1 s and back at 2.5 s; inputs without a default are 0. A parameter of the
+    effect whose value is neutral takes the last start value of a fit. Raises SpecError, and
+    ValueError if the base has no input or not that of `step`.
     """
     base = automaton_with_effects(document, project, ())
     name, height = step or _default_step(base, placed_effect)
@@ -134,7 +137,11 @@ def _simulate(automaton: Automaton, project: Project, text: str) -> Trajectory:
 
 
 def draw_signature(signature: Signature) -> Picture:
-    """Draw both simulations for up to `MAX_OUTPUTS` outputs, and below each the difference."""
+    """Draw both simulations for the first `MAX_OUTPUTS` (4) signals that are no modes, over time.
+
+    Below each plot is the difference, with minus without the effect. The title gives the effect and
+    place, its parameters and the step.
+    """
     names = [
         name
         for name in signature.without_effect.signals

@@ -34,9 +34,11 @@ class EquationChange:
 def equation_changes(
     document: Document, placed_effects: Sequence[PlacedEffect]
 ) -> list[EquationChange]:
-    """Return the equations of an expanded document that placed effects change. Raises SpecError.
+    """Return the lines of an expanded document that placed effects change, before and after.
 
-    Units, descriptions, ranges and initial values are left out.
+    Only lines of `EQUATION_SECTIONS` are included, not those that end with a unit, a description, a
+    range or an initial value. Raises SpecError if the effects cannot be applied; the result is not
+    checked otherwise.
     """
     found = diff_specs(document.root, overlay_effects(document, placed_effects).root)
     return [

@@ -31,9 +31,9 @@ EFFECT_PRIOR_STD = 0.5
 class FreeParameter:
     """A parameter [SI] with a coordinate z: value = start exp(sd z) if `is_log`, else start + sd z.
 
-    `low` and `high` are its range, `starts` the values from which fits begin. At the value `plain`
-    the effect reduces to a simpler one, and the models are nested. With `per_recording` each
-    recording has a value of its own.
+    sd is `prior_std`. `low` and `high` are its range, `starts` the values from which fits begin. At
+    `restricted_value` the effect reduces to a simpler one, and the models are nested. With
+    `per_recording` each recording has a value of its own.
     """
 
     name: str
@@ -48,13 +48,16 @@ class FreeParameter:
     restricted_value: float | None = None
 
     def value(self, z: float) -> float:
-        """Return the value [SI] at a coordinate."""
+        """Return the value [SI] at a coordinate; it may be outside the range."""
         if self.is_log:
             return self.start * math.exp(self.prior_std * z)
         return self.start + self.prior_std * z
 
     def coordinate(self, value: float) -> float:
-        """Return the coordinate of a value [SI]."""
+        """Return the coordinate of a value [SI], 0 for `start`; it may be outside the bounds.
+
+        Raises ValueError for a value that is not positive if `is_log` (and the start is positive).
+        """
         if self.is_log:
             return math.log(value / self.start) / self.prior_std
         return (value - self.start) / self.prior_std
@@ -68,10 +71,12 @@ class FreeParameter:
 def free_parameters_of(
     automaton: Automaton, effects: Sequence[str] = ()
 ) -> tuple[FreeParameter, ...]:
-    """Return the free parameters of an automaton: real scalars with a range and a value, in its
-    order.
+    """Return the real scalar parameters of an automaton with a range and a value, in its order.
 
-    `effects` names the parameters that effects add; these get the wider prior of effects.
+    `effects` names the parameters that effects add. Their prior is `EFFECT_PRIOR_STD` of the range,
+    and they have start values; that of others is `PRIOR_STD`. A coordinate is logarithmic if value
+    and range are positive; a lower bound of 0 of a positive base parameter becomes 0.1 % of its
+    value.
     """
     found = []
     for name, parameter in automaton.parameters.items():

@@ -9,8 +9,10 @@ from language.model.declaration import Parameter
 
 
 def format_value(value: float, parameter: Parameter) -> str:
-    """Return a value [SI] with six digits and its unit;
-    a rounded value outside the range is clipped.
+    """Return a value [SI] with six significant digits and its SI unit, such as `0.12 kg*m^2`.
+
+    If the rounded value is outside the range of the parameter, the value is clipped to the range
+    and written in full. Without a unit the text is the number alone.
     """
     text = f"{value:.6g}"
     if parameter.range:

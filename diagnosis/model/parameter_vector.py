@@ -24,10 +24,11 @@ class ParameterVector:
     per_recording: Reals
 
     def perturb(self, candidate: Candidate, index: int, size: float) -> ParameterVector:
-        """Return a vector with coordinate `index` increased by `size`, or decreased if that exceeds
-        its bound.
+        """Return a vector with coordinate `index` increased by `size`, or decreased at its bound.
 
-        The coordinate changes in the shared array and for every recording.
+        It is decreased if the increased one exceeds the upper bound. Only the shared coordinate is
+        compared; the lower bound is not checked. The coordinate changes in the shared array and for
+        every recording.
         """
         high = bounds_of(candidate)[index, 1]
         size = size if self.shared[index] + size <= high else -size
@@ -37,10 +38,10 @@ class ParameterVector:
         return ParameterVector(shared, own)
 
     def prior_cost(self, candidate: Candidate) -> float:
-        """Return the negative log density of the standard normal prior [nats], without its
-        constant.
+        """Return half the sum of squares of the coordinates that count [nats].
 
-        This is half the sum of squares of the coordinates that count.
+        This is the negative log density of the standard normal prior without its constant. A shared
+        coordinate counts once, one per recording for every recording.
         """
         own = per_recording_mask(candidate)
         return 0.5 * float((self.shared[~own] ** 2).sum() + (self.per_recording[:, own] ** 2).sum())
@@ -49,8 +50,8 @@ class ParameterVector:
 def vector_of(candidate: Candidate, recordings: int, start: Mapping[str, float]) -> ParameterVector:
     """Return the vector of given values [SI], clipped to the bounds.
 
-    Other parameters take their first start value, or their declared value. Every recording has the
-    same coordinates.
+    Parameters that are not in `start` have their first start value, or their declared value without
+    one; names that are no free parameters are ignored. Every recording has the same coordinates.
     """
     shared = []
     for one in candidate.free_parameters:
@@ -67,11 +68,10 @@ def extend_vector(
     base_point: ParameterVector,
     start: Mapping[str, float] | ParameterVector,
 ) -> ParameterVector:
-    """Return the vector of a candidate that takes the coordinates of `base_point` where names
-    agree.
+    """Return the vector of a candidate with the coordinates of `base_point` where names agree.
 
-    Parameters that the base does not have are at `start`: values [SI], or a vector of the
-    candidate.
+    Parameters that the base does not have are at `start`: values [SI] (or their first start value),
+    or a vector of the candidate. Parameters that only the base has are dropped.
     """
     point = (
         start
@@ -88,7 +88,10 @@ def extend_vector(
 
 
 def values_at(candidate: Candidate, point: ParameterVector, recording: int) -> dict[str, float]:
-    """Return the values [SI] of the free parameters for one recording, by name."""
+    """Return the values [SI] of the free parameters for one recording (its index), by name.
+
+    They include noise parameters and follow the order of the candidate.
+    """
     return {
         one.name: one.value(
             float(point.per_recording[recording, k] if one.per_recording else point.shared[k])
@@ -98,8 +101,9 @@ def values_at(candidate: Candidate, point: ParameterVector, recording: int) -> d
 
 
 def all_values_at(candidate: Candidate, point: ParameterVector) -> list[dict[str, float]]:
-    """Return the values [SI] for every recording;
-    the same dict object if all parameters are shared.
+    """Return the values [SI] by name for every recording of the vector.
+
+    The dict is the same object for all recordings if no parameter is per recording.
     """
     shared, recordings = values_at(candidate, point, 0), range(len(point.per_recording))
     own = [(k, one) for k, one in enumerate(candidate.free_parameters) if one.per_recording]

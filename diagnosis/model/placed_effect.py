@@ -69,7 +69,7 @@ MAX_STEPS = 40
 
 @dataclass(frozen=True)
 class PlacedEffect:
-    """An effect at a place; names that it adds to the automaton end with `_suffix`."""
+    """An effect at a place; names that it adds to the automaton end with `_` and `suffix`."""
 
     effect: Effect
     place: str
@@ -81,17 +81,23 @@ class PlacedEffect:
         return f"{self.effect.name}@{self.place}"
 
     def qualified_name(self, name: str) -> str:
-        """Return the name in the automaton of a name of the effect."""
+        """Return the name in the automaton of a name of the effect: `<name>_<suffix>`."""
         return f"{name}_{self.suffix}"
 
 
 def has_parameters(placed_effect: PlacedEffect) -> bool:
-    """Return whether an effect declares parameters; without any it would follow every signal."""
+    """Return whether an effect file has a section `parameters`.
+
+    An effect without parameters could not be fitted: it would follow every signal.
+    """
     return placed_effect.effect.body.get("parameters") is not None
 
 
 def varies_slowly(placed_effect: PlacedEffect) -> bool:
-    """Return whether a parameter of an effect may change slowly along a recording."""
+    """Return whether a parameter of an effect may change slowly along a recording.
+
+    This is so if its `form` is one of `SLOWLY_VARYING_FORMS`.
+    """
     known = placed_effect.effect.body.get("parameters")
     entries = known if isinstance(known, MappingNode) else ()
     forms = [one.node.get("form") for one in entries if isinstance(one.node, MappingNode)]
@@ -99,7 +105,11 @@ def varies_slowly(placed_effect: PlacedEffect) -> bool:
 
 
 def read_effects(folder: Path) -> tuple[Effect, ...]:
-    """Return the effects in the YAML files of a folder, sorted by file name. Raises SpecError."""
+    """Return the effects in the files `*.yaml` directly in a folder, sorted by file name.
+
+    Empty if there is no such file. Raises SpecError, with the problems of all files that can be
+    parsed.
+    """
     problems = Problems()
     found = [read_effect(read_document(path), problems) for path in sorted(folder.glob("*.yaml"))]
     problems.raise_if_errors()
@@ -107,18 +117,30 @@ def read_effects(folder: Path) -> tuple[Effect, ...]:
 
 
 def shipped_effects() -> tuple[Effect, ...]:
-    """Return the effects of the shipped library."""
+    """Return the effects of the shipped library, sorted by file name.
+
+    The files are read at each call.
+    """
     return read_effects(Path(str(resources.files("spec"))) / "effects")
 
 
 def disturbance_effect(kind: str, place: str) -> PlacedEffect:
-    """Return the disturbance at a balance, an element or an output (`kind`) named `place`."""
+    """Return the disturbance at a place; `kind` is "balance", "element" or "output".
+
+    The effect is read from `drift_of_<kind>.yaml`; its suffix is `<kind>_<place>`. Whether the
+    place exists is not checked.
+    """
     path = Path(str(resources.files("diagnosis.model"))) / "disturbances" / f"drift_of_{kind}.yaml"
     return PlacedEffect(read_effect(read_document(path), Problems()), place, f"{kind}_{place}")
 
 
 def find_placements(document: Document, effect: Effect) -> tuple[PlacedEffect, ...]:
-    """Return an effect at every place of an expanded automaton that matches it."""
+    """Return an effect at every place of an expanded automaton that matches it.
+
+    Candidates are the names in the sections flow, inputs, elements and outputs of the kinds of the
+    effect, in the order in which these sections first name them. The suffix is the name of the
+    place. Whether the automaton with the effect is valid is not checked.
+    """
     root, kinds = document.root, {fit.kind for fit in effect.place_patterns}
     names = [
         name
@@ -129,7 +151,11 @@ def find_placements(document: Document, effect: Effect) -> tuple[PlacedEffect, .
 
 
 def overlay_effects(document: Document, placed_effects: Sequence[PlacedEffect]) -> Document:
-    """Return an expanded document with effects applied in the given order. Raises SpecError."""
+    """Return an expanded document with effects applied in the given order.
+
+    Raises SpecError at the first effect that cannot be applied; the result is not checked as an
+    automaton. `document` is not changed.
+    """
     problems = Problems()
     root = document.root
     span = Span(Source("diagnosis"), 1, 1)
@@ -145,7 +171,10 @@ def overlay_effects(document: Document, placed_effects: Sequence[PlacedEffect]) 
 def automaton_with_effects(
     document: Document, project: Project, placed_effects: Sequence[PlacedEffect]
 ) -> Automaton:
-    """Return the checked automaton of a document with effects applied. Raises SpecError."""
+    """Return the checked automaton of an expanded document with effects applied in the given order.
+
+    Raises SpecError if an effect cannot be applied or the result is invalid.
+    """
     return automaton_of(overlay_effects(document, placed_effects), project)
 
 
@@ -156,13 +185,13 @@ def lower_tunable_program(
     period: Fraction,
     min_substeps: int = 1,
 ) -> tuple[Program, int]:
-    """Return the Program in which `names` are tunable, and the number of major steps in a period
-    [s].
+    """Return the Program in which `names` are tunable, and the major steps in a period [s].
 
-    The step divides the period into at least `min_substeps` and at most `MAX_STEPS` parts. It is
-    stable at the declared parameters and with those of `effect_parameters` at a quarter and four times
-    their values, and not longer than any time among these: the stability limit of a limited rate is
-    not known beforehand.
+    The step divides the period into at least `min_substeps` and at most `MAX_STEPS` (40) parts and
+    is at most `MAX_STEP` (5 ms). It is at most half the largest stable step at the declared
+    parameters and with those of `effect_parameters` at a quarter and four times their values
+    (within their ranges), and not longer than any nonzero time among these: the stability limit of
+    a limited rate is not known beforehand.
     """
     scaled = [
         _scale_parameters(automaton, effect_parameters, factor)
@@ -196,11 +225,11 @@ def minimum_substeps(
     output_names: Sequence[str],
     period: Fraction,
 ) -> int:
-    """Return the fewest major steps in a sample period [s].
+    """Return the fewest major steps in a sample period [s] for a model with effects.
 
-    It is `MIN_DELAY_STEPS` for a model with a delay or with direct feed-through to a compared
-    output (an output is constant within a step), more for an effect at an input that depends on an
-    angle (recognised by `floor`), else 1.
+    For an effect at an input and a model that calls `floor` (an angle) the steps are at most
+    `MAX_ANGLE_STEP` (1 ms) long. Otherwise it is `MIN_DELAY_STEPS` (4) for a model with a delay or
+    with direct feed-through to a compared output (an output is constant within a step), else 1.
     """
     at_input = any(
         placed_effect.effect.place_patterns[0].kind == "input" for placed_effect in placed_effects
@@ -258,7 +287,10 @@ SECTION_BY_PLACE_KIND = {
 
 
 def place_path(placed_effect: PlacedEffect) -> str:
-    """Return `section.name` of the place of an effect."""
+    """Return `section.name` of the place of an effect, by the kind of its first place pattern.
+
+    The section is flow, inputs, outputs or elements.
+    """
     kind = placed_effect.effect.place_patterns[0].kind
     return f"{SECTION_BY_PLACE_KIND[kind]}.{placed_effect.place}"
 
