@@ -52,17 +52,18 @@ class Case:
     before_fit: Callable[[], None] = lambda: None
 
     def name_of(self, path: Path) -> str:
-        """Return the display name of a recording."""
+        """Return the display name of a recording: that in `names`, else the file name."""
         return self.names.get(path, path.name)
 
 
 def read_series(
     path: Path, case: Case, automaton: Automaton, output_names: Sequence[str]
 ) -> tuple[SampledRecording, ...]:
-    """Return one sampled recording for each window of a file of a case.
+    """Return one sampled recording for each window of a file of a case, with its display name.
 
-    A file that is not read yet is read and stored in `opened_recordings`. Raises SpecError,
-    ValueError and MissingToolError.
+    A file that is not in `recordings`, or there without a needed channel, is read and stored in
+    `opened_recordings`; only columns of inputs and of `output_names` are read. Raises SpecError,
+    ValueError (too few samples) and MissingToolError.
     """
     used = [
         column.name
@@ -82,8 +83,10 @@ def build_model_set(
     series: Sequence[SampledRecording],
     output_names: tuple[str, ...],
 ) -> ModelSet:
-    """Return the model set of a case for sampled recordings,
-    with the shipped effects by default.
+    """Return the model set of a case for sampled recordings, with the shipped effects by default.
+
+    Its disturbances are at each balance of forces or torques; its fit cache is in the checkpoint
+    folder of the case and has a key of the document and the effects. Nothing is compiled yet.
     """
     effects = case.effects if case.effects is not None else shipped_effects()
     drifts = balance_disturbances(case.document, automaton)
@@ -104,7 +107,11 @@ def build_model_set(
 
 
 def file_digests(case: Case, files: tuple[Path, ...]) -> dict[str, str]:
-    """Return the first 16 hexadecimal digits of the SHA-256 of each file, by display name."""
+    """Return the first 16 hexadecimal digits of the SHA-256 of each file, by display name.
+
+    A window suffix of a path is ignored: the digest is of the whole file. Raises OSError if a file
+    cannot be read.
+    """
     return {
         case.name_of(path): hashlib.sha256(strip_window_suffix(path).read_bytes()).hexdigest()[:16]
         for path in files

@@ -72,9 +72,12 @@ class Diagnosis:
 
 
 def diagnose(case: Case, log: LogCallback = lambda text: None) -> Diagnosis:
-    """Return the diagnosis of a case; progress is reported to `log`.
+    """Return the diagnosis of a case; progress is reported to `log`, a line at a time.
 
-    Raises SpecError, ValueError (for instance if no output is compared) and MissingToolError.
+    Held-out recordings are read after the decision; those that cannot be read, or that are a copy
+    of another recording, only give a line in `unread`. Fits are stored in the checkpoint folder of
+    the case, if it has one. Raises SpecError, ValueError (if no output is compared, or a training
+    recording has too few samples) and MissingToolError, and what `before_fit` of the case raises.
     """
     start_time = time.monotonic()
     automaton = automaton_of(case.document, case.project)

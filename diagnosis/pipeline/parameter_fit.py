@@ -70,13 +70,21 @@ class Fit:
 
     @property
     def undetermined(self) -> tuple[str, ...]:
-        """The parameters that the data hardly determine."""
+        """The names of parameters that the data hardly determine.
+
+        Their `prior_ratio` exceeds `UNDETERMINED_RATIO` (0.8) or is NaN.
+        """
         return tuple(
             one.name for one in self.parameters if not one.prior_ratio <= UNDETERMINED_RATIO
         )
 
     def calibration(self, name: str, date: str = "") -> str:
-        """Return the fit as the YAML text of a calibration file, values in SI."""
+        """Return the fit as the YAML text of a calibration file, values in SI.
+
+        It has the keys `language`, `calibration` (`name`), `of`, `from` (the recordings), `date`
+        (if not empty) and, for each parameter, `{value: ..., std: ...}` with its note as a comment.
+        `std` is left out if it is not finite.
+        """
         lines = ["language: 1", f"calibration: {name}", f"of: {self.automaton.name}"]
         lines.append(f"from: {json.dumps(', '.join(self.inputs), ensure_ascii=False)}")
         lines += [f"date: {date}"] if date else []
@@ -94,10 +102,12 @@ class Fit:
 def fit(
     case: Case, parameters: Sequence[str] | None = None, log: LogCallback = lambda text: None
 ) -> Fit:
-    """Return the parameters of a case fitted to its recordings: all with a range, or the named
-    ones.
+    """Return the parameters of a case fitted to its recordings: those with a range, or the named.
 
-    Raises SpecError, ValueError (no compared output, no free parameter) and MissingToolError.
+    No effects are placed, and the better one of the two holds of inputs is used. The misfits
+    compare the declared with the fitted parameters. Raises SpecError (also for a name that is
+    unknown or has no range), ValueError (no compared output, no free parameter) and
+    MissingToolError.
     """
     automaton = automaton_of(case.document, case.project)
     if parameters is not None:
@@ -131,7 +141,8 @@ def restrict_free_parameters(
 ) -> Document:
     """Return an expanded document in which only the named parameters have a range.
 
-    Raises SpecError if a name is unknown or has no range.
+    The others lose the key `range` and keep their value. Raises SpecError, with all problems, if a
+    name is unknown (a similar name is suggested) or its parameter has no range or no value.
     """
     problems = Problems()
     for name in names:
@@ -181,7 +192,12 @@ def _fitted_parameters(automaton: Automaton, estimate: Estimate) -> tuple[Fitted
 
 
 def parameter_note(fitted_value: Quantity, coordinate: FreeParameter) -> str:
-    """Return a remark on a fitted parameter: at a bound, undetermined, or ""."""
+    """Return a remark on a fitted parameter: at a bound, not determined by the data, or "".
+
+    It is at a bound if its distance from an end is below `BOUND_TOLERANCE` (0.1 %) of the range,
+    which comes first, and not determined if `prior_std_ratio` exceeds `UNDETERMINED_RATIO` (0.8) or
+    is NaN.
+    """
     width = BOUND_TOLERANCE * (coordinate.high - coordinate.low)
     if min(fitted_value.value - coordinate.low, coordinate.high - fitted_value.value) < width:
         return "at the end of its range"
@@ -191,6 +207,10 @@ def parameter_note(fitted_value: Quantity, coordinate: FreeParameter) -> str:
 
 
 def prior_std_ratio(fitted_value: Quantity, coordinate: FreeParameter) -> float:
-    """Return the standard deviation of a fitted parameter over that of its prior."""
+    """Return the standard deviation of a fitted parameter over that of its prior.
+
+    For a logarithmic coordinate the prior's is scaled by the fitted value. The result is 1 if the
+    prior's standard deviation is 0.
+    """
     slope = coordinate.prior_std * (fitted_value.value if coordinate.is_log else 1.0)
     return fitted_value.std / abs(slope) if slope else 1.0

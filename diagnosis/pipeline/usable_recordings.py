@@ -16,7 +16,8 @@ from engine.recordings.recording import Channel, Recording
 def usable_recordings(check: RecordingCheck, case: Case) -> tuple[Path, ...]:
     """Return the training recordings without errors; none if half of them or more have one.
 
-    An error in few recordings is one of these files; in many recordings it is one of the map.
+    An error in few recordings is one of these files; in many recordings, or without a recording, it
+    is one of the map, and no recording is usable.
     """
     bad = {finding.recording for finding in recording_errors(check)}
     kept = tuple(file for file in case.train if case.name_of(file) not in bad)
@@ -26,7 +27,7 @@ def usable_recordings(check: RecordingCheck, case: Case) -> tuple[Path, ...]:
 
 
 def recording_errors(check: RecordingCheck) -> list[Finding]:
-    """Return the findings that are errors."""
+    """Return the findings of severity `error`, in their order."""
     return [finding for finding in check.findings if finding.severity == "error"]
 
 
@@ -56,7 +57,10 @@ class LazyRecordings(Mapping[Path, Recording]):
         held_out: Collection[Path],
         read: Callable[[Path], Recording],
     ) -> None:
-        """Store known recordings and the function that reads the held-out ones."""
+        """Store known recordings and the function that reads a held-out one at its first access.
+
+        Iteration and length cover only the recordings that are known so far.
+        """
         self._known = dict(known)
         self._held_out = held_out
         self._read = read
@@ -81,7 +85,10 @@ def select_usable(
 ) -> tuple[tuple[Path, ...], list[str]]:
     """Return the usable training recordings of a case, and why others are left out.
 
-    With `anyway` errors of the check are ignored, but not recordings that no model can follow.
+    With `anyway` errors of the check are ignored, but not recordings that no model can follow
+    (`unusable_reason`). The reasons are the formatted errors of the check, if they exclude a
+    recording, then `<name>: <reason>` for each recording that no model can follow. All recordings
+    must be in `recordings` of the case.
     """
     usable_files = case.train if anyway else usable_recordings(check, case)
     reasons = (
@@ -97,7 +104,12 @@ def select_usable(
 
 
 def unusable_reason(recording: Recording) -> str:
-    """Return why no model can follow a recording; "" if one can."""
+    """Return why no model can follow a recording, for its first faulty channel; "" if one can.
+
+    A channel is faulty with a value beyond `MAX_VALUE` (1e12, SI); a compared one also with fewer
+    than `MIN_SAMPLES` (10) samples, a median period below `MIN_SAMPLE_PERIOD` (1 us), or a duration
+    above `MAX_SAMPLES` periods. The text is "`column` has ...".
+    """
     for channel in recording.channels.values():
         reason = _range_fault(channel) or (
             _sampling_fault(channel) if channel.column.compare else ""
