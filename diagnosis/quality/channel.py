@@ -67,7 +67,12 @@ class ChannelCheck:
 
 
 def check_channel(recording: Recording, channel: Channel) -> ChannelCheck:
-    """Return the properties of a channel."""
+    """Return the properties of a channel; it must have a value.
+
+    A step above `GAP_FACTOR` (1.5) median steps has lost samples, and one above `LONG_GAP_FACTOR`
+    (10) is a gap. `signal` is the input or output of the map, else the name of the column. Rate,
+    jitter, noise and quantum are 0 if there are too few values.
+    """
     times, values = channel.seconds, channel.array
     steps = np.diff(times)
     usual = float(np.median(steps)) if len(steps) else 0.0
@@ -101,7 +106,13 @@ def check_channel(recording: Recording, channel: Channel) -> ChannelCheck:
 
 
 def channel_findings(check: ChannelCheck, is_compared: bool) -> list[Finding]:
-    """Return the findings on a channel; a constant value is reported for compared channels only."""
+    """Return the findings on a channel, at most three of them gaps, in a fixed order of kinds.
+
+    The kinds are no_signal (constant; only if `is_compared`), dropped (from `SOME_DROPPED` 1 % on,
+    an error from `MUCH_DROPPED` 10 % on), gap, jitter (above `JITTER_FRACTION` of a step), repeated
+    (from `MUCH_REPEATED` 8 % on, an error from 10 % on), stuck and clipped (from `CLIPPED_FRACTION`
+    1 % on).
+    """
     findings: list[Finding] = []
 
     def report(

@@ -70,11 +70,17 @@ class ColumnHypothesis:
 
     @property
     def is_error(self) -> bool:
-        """Whether the change corrects an error of the data rather than a usual lag."""
+        """Whether the change is an error: a negation, or a lag from `MIN_LAG` (0.1 s) on.
+
+        False for a smaller lag, which is usual, and for an input that is not used.
+        """
         return self.factor < 0 or abs(self.lag) >= MIN_LAG
 
     def is_similar(self, other: ColumnHypothesis) -> bool:
-        """Return whether two hypotheses describe the same error."""
+        """Return whether two hypotheses have the same column and factor, and lags within 0.06 s.
+
+        The limit is `CLOCK_TOLERANCE`.
+        """
         near = abs(self.lag - other.lag) <= CLOCK_TOLERANCE
         return near and (self.column, self.factor) == (other.column, other.factor)
 
@@ -94,8 +100,12 @@ def find_clock_and_sign_errors(
     mapping: RecordingMap,
     recordings: Sequence[Recording],
 ) -> list[Finding] | None:
-    """Return findings on wrong clocks and signs,
-    or None if the model cannot be used for the search.
+    """Return findings on wrong clocks and signs, or None if the model cannot be used.
+
+    The findings are errors of kind `sign` or `clock_offset`, those of `find_column_errors`. None is
+    returned if the model does not compile or no C compiler works, if the recordings have different
+    rates, or if the model cannot be linearised. Raises ValueError if a recording has too few
+    samples.
     """
     seen = compared_outputs(mapping, automaton)
     series = [
@@ -130,10 +140,14 @@ def _to_finding(column: ColumnMapping, error: ColumnError) -> Finding:
 def find_column_errors(
     candidate: Candidate, series: Sequence[SampledRecording]
 ) -> list[ColumnError]:
-    """Return the errors common to all recordings, or those of single recordings.
+    """Return the error common to all recordings, or those of single recordings; the first suffices.
 
-    Recordings shorter than four times `MAX_LAG` are left out. An error of a single recording counts
-    only if its column has the same error wherever it has one.
+    Recordings not longer than four times `MAX_LAG` (0.48 s) are left out. An error needs `MIN_GAIN`
+    (100 nats) and `MIN_GAIN_PER_SAMPLE` (0.2) and must exceed the gains of small lags and unused
+    inputs by `HARMLESS_GAIN_FACTOR` and those of other columns by `OTHER_COLUMN_FACTOR`. It is
+    common if at least two, a third of all recordings and more than `SHARED_FRACTION` of those with
+    an error agree; its lag is their median. An error of a single recording counts only if its
+    column has the same error wherever it has one.
     """
     series = [one for one in series if float(one.period) * one.count > 4.0 * MAX_LAG]
     if not series:
@@ -180,7 +194,9 @@ def hypothesis_gains(
 ) -> Mapping[ColumnHypothesis, Reals]:
     """Return the log-likelihood gain [nats] of each hypothesis in each recording (recordings,).
 
-    Inputs that are constant in a recording are not tested.
+    Hypotheses are lags from -`MAX_LAG` to `MAX_LAG` in steps of `LAG_STEP` (without 0) and the
+    negation of each input and output, and each input not used. Inputs that are constant in a
+    recording are not tested. The gain is -inf in a recording where the model diverges.
     """
     inputs = series[0].inputs.shape[1]
     moving_inputs = [
@@ -206,7 +222,9 @@ def hypothesis_gains(
 def apply_hypothesis(series: SampledRecording, hypothesis: ColumnHypothesis) -> SampledRecording:
     """Return the inner part of a recording with a hypothesis applied to its column.
 
-    `MAX_LAG` seconds are cut off at both ends, so that every lag has values.
+    `MAX_LAG` seconds are cut off at both ends, so that every lag has values; the column is advanced
+    by the lag, rounded to samples, and multiplied by the factor (`UNUSED_FACTOR` instead of 0).
+    `start` of the result is still that of the recording.
     """
     margin = round(MAX_LAG / float(series.period))
     late = round(hypothesis.lag / float(series.period))

@@ -38,8 +38,12 @@ MIN_NUMBER_FRACTION = 0.2
 
 
 def guess_map(path: Path, databases: Sequence[str] = ()) -> RecordingMap:
-    """Return a map of up to `MAX_COLUMNS` numeric columns of a file.
+    """Return a map of the first `MAX_COLUMNS` (12) numeric columns of a file.
 
+    The time is the first column named like a time (`t`, `time_ms`), else the first strictly
+    increasing one. The unit is that of the file, else that of the suffix of the name
+    (`UNIT_SUFFIXES`), else none; columns in units of force or torque are inputs, all others
+    outputs. Repeated names are left out. `databases` are the CAN databases of the command line.
     Raises SpecError if there is no time column or no numeric column, and MissingToolError if the
     format needs a package that is not installed.
     """

@@ -114,7 +114,7 @@ class EffectTestability:
 
     @property
     def is_testable(self) -> bool:
-        """Whether all needs of the effect are met."""
+        """Whether all needs of the effect are met (`lacking` is empty)."""
         return not self.lacking
 
 
@@ -129,7 +129,7 @@ class Excitation:
 
     @property
     def is_absent(self) -> bool:
-        """Whether there are inputs and none of them is excited."""
+        """Whether there are inputs and none of them has a step or an excited frequency."""
         idle = [not signal.steps and signal.band == 0.0 for signal in self.inputs]
         return bool(idle) and all(idle)
 
@@ -139,8 +139,10 @@ def analyse_excitation(
 ) -> Excitation:
     """Return the excitation of recordings, cut into the windows that are used.
 
-    `checks` give the noise of channels. Without a force input, speeds that are inputs count as
-    inputs.
+    `checks` give the noise of channels. Channels in units of speed are speeds, also if they are
+    inputs; a recording without a speed has the rates of its positions instead. Without another
+    input, speeds that are inputs count as inputs too. The effects are those of `EFFECT_NEEDS`, in
+    its order.
     """
     used = [
         _with_derived_speeds(piece)
@@ -190,7 +192,7 @@ def _with_derived_speeds(piece: Recording) -> Recording:
 
 
 def is_speed(channel: Channel) -> bool:
-    """Return whether a channel is a rotational or translational speed, by its unit."""
+    """Return whether the dimension of a channel's unit is that of rad/s or m/s."""
     dimension = column_dimension(channel.column)
     return any(are_compatible(dimension, parse_unit(text).dimension) for text in SPEEDS)
 

@@ -30,15 +30,21 @@ class Finding:
 
 
 def sort_by_severity(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Return distinct findings in the order error, warning, note; else the order stays."""
+    """Return findings in the order error, warning, note, without equal ones.
+
+    The order within a severity stays.
+    """
     unique = dict.fromkeys(findings)
     return tuple(sorted(unique, key=lambda finding: SEVERITIES.index(finding.severity)))
 
 
 def format_findings(findings: Sequence[Finding]) -> list[tuple[Severity, str]]:
-    """Return one line for each group of findings of one severity and kind, errors first.
+    """Return one line for each group of findings of one severity and kind, with its severity.
 
-    A group shows the text of its first finding; kinds in `UNGROUPED_KINDS` are grouped by text too.
+    Errors come first, notes last; within a severity the order is that of first findings. A line is
+    "`a`, `b` (files): text" with the text of the first finding; a text that names its channel in
+    backticks is followed by ", and N more like that (files)" instead. Kinds in `UNGROUPED_KINDS`
+    form a group for each text. Equal findings are listed once.
     """
     groups: dict[tuple[Severity, str, str], list[Finding]] = {}
     for finding in sort_by_severity(findings):

@@ -45,7 +45,7 @@ class OutputComparison:
 
     @property
     def nrmse(self) -> float:
-        """`rms` over the standard deviation of the measured values."""
+        """`rms` over the standard deviation of the measured values (NaN or infinite if 0)."""
         return self.rms / float(np.std(self.measured))
 
 
@@ -69,7 +69,7 @@ RunFunction = Callable[[System, Scenario, Mapping[str, Program]], Trajectory]
 def run_interpreter(
     system: System, scenario: Scenario, programs: Mapping[str, Program]
 ) -> Trajectory:
-    """Return the trajectory of a run by the interpreter."""
+    """Return the trajectory of Programs under a scenario, run by the interpreter."""
     return simulate(system, scenario, programs=programs)
 
 
@@ -82,9 +82,12 @@ def simulate_free_run(
 ) -> FreeRun:
     """Return a simulation under recorded inputs from the first measured states, without feedback.
 
-    It begins when every input has a value. Between its rows, one major step apart, outputs are
-    interpolated linearly. `programs` is a cache for other recordings of the same automaton and is
-    extended. Raises SpecError if the recording ends before every input has a value.
+    It begins when every recorded input has a value, and ends with the last channel. An input
+    without a channel has the constant of the map, else its default, else 0. A state that is a
+    compared output begins at its latest measured value. Outputs are interpolated linearly between
+    rows, one major step apart, at the time stamps of the measurements. `programs` is a cache for
+    other recordings of the same automaton and is extended. Raises SpecError if the recording ends
+    before every input has a value.
     """
     input_channels = [c for c in recording.channels.values() if c.column.to in automaton.inputs]
     outputs = [c for c in recording.channels.values() if c.column.compare in automaton.outputs]

@@ -60,17 +60,17 @@ class OutputAgreement:
 
     @property
     def is_clear(self) -> bool:
-        """Whether both are the same motion."""
+        """Whether both are the same motion: |correlation| of at least `MIN_CORRELATION` (0.75)."""
         return abs(self.correlation) >= MIN_CORRELATION
 
     @property
     def correlation_gain(self) -> float:
-        """The increase of the correlation's magnitude by the lag."""
+        """The increase of the correlation's magnitude by the lag; negative if it decreases."""
         return abs(self.correlation) - abs(self.correlation_without_lag)
 
     @property
     def significant_lag(self) -> float:
-        """The lag [s], or 0 if the signals correlate as well without a lag."""
+        """The lag [s] if `is_clear` and `correlation_gain` exceeds `LAG_MARGIN` (0.02), else 0."""
         return self.lag if self.is_clear and self.correlation_gain > LAG_MARGIN else 0.0
 
 
@@ -79,7 +79,9 @@ def compare_with_simulation(
 ) -> list[OutputAgreement]:
     """Return the agreement of each output with a simulation, for a piece of each recording window.
 
-    Pieces are the most excited ones; no more than `MAX_SIMULATED_TIME` in all is simulated.
+    Pieces are the most excited ones of `MIN_PIECE` to `MAX_PIECE` (4 to 10 s); once
+    `MAX_SIMULATED_TIME` (24 s) is reached, later windows are left out. Outputs that
+    `compare_signals` cannot compare are left out. Inputs faster than 100 Hz are thinned out.
     """
     agreements: list[OutputAgreement] = []
     remaining_time = MAX_SIMULATED_TIME
@@ -98,8 +100,11 @@ def compare_with_simulation(
 
 
 def most_excited_piece(piece: Recording, max_length: Fraction) -> Recording:
-    """Return the most excited part of a recording of length `max_length` [s];
-    all of it if shorter.
+    """Return the most excited part of a recording of length `max_length` [s]; all of it if shorter.
+
+    The parts begin at multiples of half of that length. The most excited one has the largest sum,
+    over inputs, of the standard deviation of the changes over that of the values; the first one is
+    taken if several are equal.
     """
     if piece.end - piece.start <= max_length:
         return piece
@@ -154,10 +159,12 @@ def _kernel_size(spread: float) -> int:
 def compare_signals(
     recording: str, name: str, comparison: OutputComparison, spread: float = SMOOTHING_STD
 ) -> OutputAgreement | None:
-    """Return the agreement of two signals, smoothed by `spread` [s].
+    """Return the agreement of the rates of change of two signals, smoothed by `spread` [s].
 
-    The lag of largest correlation is taken, or the one of the negated signal if that is clearly
-    better. The result is None for signals that are short, constant or not finite.
+    The lag of largest correlation within `MAX_LAG` (1 s) is taken, or that of the most negative one
+    if its magnitude is larger by `REVERSAL_MARGIN` (0.15); the gain is then negative. The first
+    `TRANSIENT_TIME` (0.8 s) are left out. The result is None if less than 1 s remains, the
+    simulation is not finite, or a rate is constant.
     """
     start, end = comparison.times[0] + TRANSIENT_TIME, comparison.times[-1]
     if end - start < 1.0 or not np.all(np.isfinite(comparison.simulated)):

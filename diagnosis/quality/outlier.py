@@ -31,8 +31,9 @@ SECONDS_PER_HOUR = 3600.0
 
 
 def drop_huge_values(recording: Recording) -> Recording:
-    """Return a recording without values above `MAX_VALUE`;
-    channels without other values are dropped.
+    """Return a recording without values beyond `MAX_VALUE` (1e15) or NaN.
+
+    Channels without other values are dropped.
     """
     channels = {}
     for name, channel in recording.channels.items():
@@ -47,9 +48,12 @@ def drop_huge_values(recording: Recording) -> Recording:
 
 
 def find_outliers(recording: Recording, automaton: Automaton | None) -> list[Finding]:
-    """Return an error for each channel with outliers, which names the largest one.
+    """Return an error for each channel with outliers, which names the largest one and its time.
 
-    The range of the compared state, if the automaton declares one, is added to the text.
+    Outliers are values beyond `MAX_VALUE`; without any, values whose distance from the median of
+    `MEDIAN_SAMPLES` (5) exceeds `RANGE_FACTOR` (3) times the range of these medians and
+    `NOISE_FACTOR` (20) standard deviations of the noise, in a channel of at least 20 values. The
+    range of the compared state is added if the automaton declares one that the value exceeds.
     """
     found = []
     for name, channel in recording.channels.items():
@@ -97,7 +101,11 @@ def _range_text(channel: Channel, value: float, automaton: Automaton | None, fac
 
 
 def find_time_leaps(recording: Recording) -> list[Finding]:
-    """Return an error for the first long pause of time stamps in each window of a recording."""
+    """Return an error for the first long pause of time stamps in each window of a recording.
+
+    The stamps are those of all channels together; a pause is long from `MAX_PAUSE_FRACTION` (half)
+    of the window's duration and `MIN_PAUSE` (2 s) on.
+    """
     found = []
     for piece in split_by_windows(recording):
         least = max(float(MAX_PAUSE_FRACTION * (piece.end - piece.start)), MIN_PAUSE)

@@ -60,8 +60,12 @@ def check_recordings(
 ) -> RecordingCheck:
     """Return the checks of recordings; with an automaton also of units, signs and clocks.
 
-    `find_clock_errors` searches wrong clocks and signs by prediction, or returns None if it cannot;
-    the clock findings of the simulation are then warnings. Sampled automata are not simulated.
+    Values beyond `MAX_VALUE` are reported and then dropped. Recordings with a finding of
+    `DISQUALIFYING_KINDS` are not compared with the model; without an automaton their speeds are
+    compared with each other instead. `find_clock_errors` searches wrong clocks and signs by
+    prediction, or returns None if it cannot; the clock findings of the simulation are then
+    warnings. Sampled automata are not simulated. Raises SpecError if the simulation of a recording
+    fails.
     """
     early_findings = [
         f for one in recordings for f in (*find_outliers(one, automaton), *find_time_leaps(one))
@@ -193,8 +197,9 @@ def _find_missing_signals(
 
 
 def used_columns(mapping: RecordingMap, automaton: Automaton | None) -> list[str]:
-    """Return the columns that an automaton reads or compares;
-    all of them without one or without any.
+    """Return the columns of a map that an automaton reads or compares, in the order of the map.
+
+    All columns are returned without an automaton, and if it uses none.
     """
     if automaton is None:
         return list(mapping.columns)

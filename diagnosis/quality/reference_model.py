@@ -36,7 +36,11 @@ class ReferenceModel:
 
     @cached_property
     def coarse_automaton(self) -> Automaton:
-        """The automaton with the longest major step that is stable and resolves motion of 4 Hz."""
+        """The automaton with the longest major step that is stable and resolves motion of 4 Hz.
+
+        The step is the smallest stability limit over `STABILITY_MARGIN` (3), at most `MAX_STEP` (4
+        ms), but not below the step of the automaton, which is unchanged without stability limits.
+        """
         motion = program_of(self.automaton).integration
         limits = [limit.step for limit in motion.stability_limits] if motion else []
         if not limits:
@@ -46,7 +50,11 @@ class ReferenceModel:
         return dataclasses.replace(self.automaton, step=step)
 
     def simulate(self, recording: Recording) -> FreeRun:
-        """Return a free run of the coarse automaton under recorded inputs. Raises SpecError."""
+        """Return a free run of the coarse automaton under recorded inputs.
+
+        Programs are kept for further recordings. Raises SpecError if the recording ends before
+        every input has a value.
+        """
         return simulate_free_run(
             self.coarse_automaton, recording, self.mapping, self.run_programs, self._programs
         )

@@ -62,7 +62,11 @@ class ColumnCorrection:
     reason: str = ""
 
     def apply(self, recording: Recording) -> Recording:
-        """Return a recording with the correction applied."""
+        """Return a recording with the correction applied; `recording` is not changed.
+
+        The times and values of both columns are exchanged, or the values divided by `factor`.
+        KeyError without the column.
+        """
         channels = dict(recording.channels)
         one = channels[self.column]
         if self.other:
@@ -75,7 +79,10 @@ class ColumnCorrection:
         return dataclasses.replace(recording, channels=channels)
 
     def to_finding(self, recording: str) -> Finding:
-        """Return the finding on a recording, or on all of them if the name is ""."""
+        """Return the error on a recording, or on all of them for the name "".
+
+        Its kind is `swap` for an exchange, else `unit`, with the reason as a question.
+        """
         if self.other:
             text = f"`{self.column}` and `{self.other}` are exchanged: they go with the model "
             return Finding("swap", recording, self.column, text + "the other way round", "error")
@@ -92,8 +99,12 @@ def find_corrections(
 ) -> list[Finding]:
     """Return findings on corrections of recordings that do not agree with the model.
 
-    A recording with a unit error in `findings` is skipped if all its outputs correlate well. A
-    correction that explains most of several recordings is reported once for all.
+    An output disagrees if |log gain| + 1 - |correlation| exceeds `MIN_DISTANCE` (0.7). At most
+    `MAX_TESTED_RECORDINGS` (3), those of largest distance, are simulated with each possible factor
+    or exchange of columns; a correction must make all outputs agree, and the nearest one is taken.
+    A recording with a unit error in `findings` is skipped if all its outputs correlate by more than
+    `SURE_CORRELATION`. If all recordings that were corrected (at least two) have the same
+    correction, and `SHARED_FRACTION` of all disagree, it is reported once for all.
     """
     by_name = {one.name: [r for r in agreements if r.recording == one.name] for one in recordings}
     sure = {
@@ -136,7 +147,9 @@ def find_corrections(
 def find_millisecond_time(recording: Recording, reference: ReferenceModel) -> list[Finding]:
     """Return a finding if the time of a recording may be in milliseconds, else an empty list.
 
-    It is an error if the recording agrees with the model after a correction, else a warning.
+    It may be if the shortest median period of a channel is at least `MAX_SAMPLE_TIME` (0.5 s) and
+    `MAX_SAMPLE_STEPS` (200) steps of the model. The finding is an error if all outputs agree with
+    the model after a division of the time by 1000, else a warning.
     """
     usual = min(
         (
@@ -249,8 +262,8 @@ def _distance(agreement: OutputAgreement) -> float:
 def replace_corrected(findings: Sequence[Finding], corrections: Sequence[Finding]) -> list[Finding]:
     """Return findings with corrections in place of other findings on the same recordings.
 
-    A unit correction of a channel that already has a unit finding is dropped. With a correction of
-    all recordings only corrections are returned.
+    A unit correction of a channel and recording that already have a unit finding is dropped. With a
+    correction of all recordings ("") only corrections are returned; else they come last.
     """
     same = {(f.channel, f.recording) for f in findings if f.kind == "unit"}
     new = [

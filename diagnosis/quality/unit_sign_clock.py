@@ -53,8 +53,12 @@ def find_unit_sign_clock_errors(
 ) -> list[Finding]:
     """Return findings on signs, units and clocks, for all recordings together or for single ones.
 
-    An error that most recordings show is reported once. A clock offset of single recordings is a
-    warning and needs a clear increase of the correlation.
+    Only clear agreements count. With a clear agreement in fewer than two recordings the findings of
+    each are returned. Otherwise an error that at least two and more than `SHARED_FRACTION` (0.6) of
+    the recordings show is reported once; then other findings are left out unless it is a clock
+    offset. If half of the recordings have unit errors, only these are returned. A clock offset of a
+    single recording is a warning and needs an increase of the correlation by more than
+    `SINGLE_RECORDING_MARGIN`.
     """
     own = {
         recording.name: _find_errors(
@@ -106,10 +110,13 @@ def find_unit_sign_clock_errors(
 
 
 def agrees_with_other_outputs(finding: Finding, agreements: Sequence[OutputAgreement]) -> bool:
-    """Return whether the level of an output agrees with outputs that are consistent with the model.
+    """Return whether a unit or scale finding is refuted by the level of the other outputs.
 
-    Missing physics can make one output oscillate much more than in the simulation, which looks like
-    a scale error; a wrong unit would change its level relative to the others.
+    This is so if the median `level` of its channel is within `FACTOR_TOLERANCE` (30 %) of that of
+    the other clear outputs with a gain within `MAX_SCALE_RATIO`, in the same recordings. False for
+    other kinds of findings, without such outputs, or if a level is 0. Missing physics can make one
+    output oscillate much more than in the simulation, which looks like a scale error; a wrong unit
+    would change its level relative to the others.
     """
     if finding.kind not in ("unit", "scale"):
         return False
