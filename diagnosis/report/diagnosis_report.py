@@ -46,14 +46,20 @@ class DiagnosisReport:
 
 
 def verdict_to_json(verdict: Verdict) -> dict[str, Any]:
-    """Return the JSON object of a verdict; numbers that are not finite become None."""
+    """Return the JSON object of a verdict, as in `verdict.json`.
+
+    Numbers that are not finite become None.
+    """
     found = replace_non_finite(verdict.to_json())
     assert isinstance(found, dict)
     return found
 
 
 def replace_non_finite(value: Any) -> Any:
-    """Return nested dicts and lists with None in place of numbers that are not finite."""
+    """Return nested dicts and lists with None in place of floats that are not finite.
+
+    Other values, also tuples and what they contain, are returned unchanged.
+    """
     if isinstance(value, dict):
         return {key: replace_non_finite(one) for key, one in value.items()}
     if isinstance(value, list):
@@ -62,7 +68,11 @@ def replace_non_finite(value: Any) -> Any:
 
 
 def unusable_reasons(check: RecordingCheck) -> tuple[str, ...]:
-    """Return the messages of a verdict on unusable recordings: a headline and the errors."""
+    """Return the messages of a verdict on unusable recordings.
+
+    The first is "the recordings are not usable"; the lines of `format_findings` for the errors
+    follow.
+    """
     return (
         "the recordings are not usable",
         *(text for _, text in format_findings(recording_errors(check))),
@@ -74,7 +84,8 @@ def undecided_verdict(
 ) -> Verdict:
     """Return the verdict `unknown` without a diagnosis; `messages` give the reasons.
 
-    `train` are digests of the files by name.
+    `train` are digests of the files by name, `runtime_s` is the run time [s]. There are no effects
+    and candidates, and the probability of another cause is 1.
     """
     return Verdict(
         "unknown", (), (), 1.0, (), (), {"train": {}}, {}, None, runtime_s, messages, train

@@ -39,8 +39,8 @@ class ModelComparison:
 def compare_models(report: DiagnosisReport) -> list[ModelComparison]:
     """Return the comparison on held-out recordings (if any), then on training recordings.
 
-    The list is empty without a diagnosis. For held-out recordings, parameters per recording are
-    fitted.
+    The datasets are `held_out` and `train`. The list is empty without a diagnosis. For held-out
+    recordings, parameters per recording are fitted.
     """
     found = report.diagnosis
     if found is None:

@@ -10,9 +10,11 @@ DIMENSIONLESS = ("1", "")
 
 
 def format_with_std(value: float, std: float) -> str:
-    """Return `value ± std` with two digits of the standard deviation, and as many places.
+    """Return `3.770 ± 0.051`: the value with the places of a two-digit standard deviation.
 
-    Without a finite positive standard deviation the value has four digits.
+    Large deviations give rounded integers (`12300 ± 450`); values from 1e6 on and deviations below
+    about 1e-7 give `%g` forms. Without a finite positive standard deviation the value has four
+    significant digits; `-` if the value is not finite.
     """
     if not (math.isfinite(value) and math.isfinite(std)) or std <= 0.0:
         return format_significant(value, 4)
@@ -27,14 +29,15 @@ def format_with_std(value: float, std: float) -> str:
 
 
 def format_quantity(quantity: Quantity) -> str:
-    """Return an estimated value as `3.77 ± 0.05 N*m`."""
+    """Return an estimated value as `3.770 ± 0.051 N*m`; without the unit if that is "1" or ""."""
     text = format_with_std(quantity.value, quantity.std)
     return text if quantity.unit in DIMENSIONLESS else f"{text} {quantity.unit}"
 
 
 def format_significant(value: float, digits: int = 3) -> str:
-    """Return a number with significant digits, without exponent from 1e-4 to 1e6;
-    `-` if not finite.
+    """Return a number with significant digits; `-` if it is not finite.
+
+    Numbers from 1e-4 to 1e6 have no exponent and keep trailing zeros (`0.500`); 0 is `0`.
     """
     if not math.isfinite(value):
         return "-"
@@ -46,7 +49,10 @@ def format_significant(value: float, digits: int = 3) -> str:
 
 
 def format_percent(part: float) -> str:
-    """Return a fraction as `0.96 %`, `3.2 %` or `45 %`; `-` if it is not finite."""
+    """Return a fraction as `0.96 %`, `3.2 %` or `45 %`; `-` if it is not finite.
+
+    There are two decimals below 1 % (in magnitude), one below 10 %, else none.
+    """
     value = 100.0 * part
     if not math.isfinite(value):
         return "-"
@@ -55,7 +61,11 @@ def format_percent(part: float) -> str:
 
 
 def format_change(before: float, after: float) -> str:
-    """Return the relative change of a misfit: `-52 %`, `+7 %`, `as before`, or `-` if undefined."""
+    """Return the relative change of a misfit: `−52 %`, `+7 %`, `as before`, or `-` if undefined.
+
+    A change below 0.5 % is `as before`. It is undefined if a value is not finite or `before` is not
+    positive. The minus sign is U+2212.
+    """
     if not (math.isfinite(before) and math.isfinite(after)) or before <= 0.0:
         return "-"
     part = 100.0 * (after / before - 1.0)
@@ -63,7 +73,7 @@ def format_change(before: float, after: float) -> str:
 
 
 def format_probability(share: float) -> str:
-    """Return a probability in per cent, limited to `< 0.1 %` and `> 99.9 %`."""
+    """Return a probability as `12.3 %`, or `< 0.1 %` below and `> 99.9 %` above these limits."""
     if share < 0.001:
         return "< 0.1 %"
     return "> 99.9 %" if share > 0.999 else f"{100.0 * share:.1f} %"

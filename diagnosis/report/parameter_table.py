@@ -34,8 +34,11 @@ class ParameterRow:
 
 
 def parameter_rows(report: DiagnosisReport, selection: Selection) -> list[ParameterRow]:
-    """Return a row for each parameter of the final model:
-    declared, recalibrated and final value.
+    """Return a row for each parameter of the final model: declared, recalibrated and final value.
+
+    The order is that of the model. A parameter of an effect has `new` as declared value and "" for
+    recalibrated value and change. Values have standard deviations; the description is that of the
+    spec, else of the effect; the note is that of `parameter_note`.
     """
     before, after = quantities_of(selection.base), quantities_of(selection.model)
     effect_abouts = {
@@ -71,9 +74,11 @@ def _parameter_tables(body: MappingNode) -> list[tuple[str, MappingNode]]:
 
 
 def format_biased_parameters(selection: Selection) -> str:
-    """Return how far the recalibration without effects moves parameters, the largest change first.
+    """Return how far the recalibration without effects moves parameters from their final values.
 
-    The text is empty if no parameter is biased.
+    It is `name +12 %, ...`, the largest change first, at most `MAX_BIASED` (5). A parameter is
+    biased from a change of `MIN_BIAS` (3 %) and `MIN_BIAS_STDS` (3) standard deviations on; only
+    positive values count. The text is "" if none is biased.
     """
     before, after = quantities_of(selection.base), quantities_of(selection.model)
     found = []
@@ -93,7 +98,7 @@ def _format_change(declared: float, current: float) -> str:
 
 
 def about_of(report: DiagnosisReport, section: str, name: str) -> str:
-    """Return the description of an entry in a section of the spec; "" if there is none."""
+    """Return the text of `about` of an entry in a section of the spec; "" if there is none."""
     table = report.case.document.root.get(section)
     entry = table.get(name) if isinstance(table, MappingNode) else None
     return text_of(entry, "about") if isinstance(entry, MappingNode) else ""
@@ -106,7 +111,11 @@ def text_of(table: MappingNode, key: str) -> str:
 
 
 def format_fixed_parameters(report: DiagnosisReport) -> list[str]:
-    """Return `name = value` of each real parameter without a range: these are taken as exact."""
+    """Return `name = value` of each real parameter without a range: these are taken as exact.
+
+    Values are in SI with five significant digits, without unit, in the order of the automaton;
+    parameters without a value (tables) are left out.
+    """
     return [
         f"{name} = {float(one.value):.5g}"
         for name, one in report.automaton.parameters.items()

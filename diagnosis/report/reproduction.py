@@ -21,9 +21,11 @@ SCENARIO = "scenario.yaml"
 
 
 def format_window_csv(window: WorstWindow, inputs: Mapping[str, str]) -> str:
-    """Return a window as CSV in SI: time, inputs, recorded outputs, and both simulations.
+    """Return a window as CSV in SI: `t_s`, inputs, recorded outputs, and both simulations.
 
-    `inputs` are names with units. Values that were not recorded are blank.
+    Simulated columns are `<signal>_without`, then `<signal>_with`. `inputs` are names with units,
+    of which only the names are used. Numbers have nine digits; values that are not finite are
+    blank.
     """
     seen = window.signals
     names = ["t_s", *inputs, *seen]
@@ -41,9 +43,10 @@ def _format_value(value: float) -> str:
 
 
 def format_scenario(report: DiagnosisReport, window: WorstWindow) -> str:
-    """Return the YAML of a scenario that runs the variant through a window's CSV file.
+    """Return the YAML of a scenario that runs `variant.yaml` through a window's `window.csv`.
 
-    Inputs are held between samples, as in C. Compared states start at their first recorded value.
+    Its name is that of the automaton with `_window`. Inputs are held between samples, as in C.
+    Compared outputs that are states start at their first recorded value; others have no start.
     """
     automaton = report.automaton
     fed = {name: format_si_unit(one.unit.dimension) for name, one in automaton.inputs.items()}
@@ -73,9 +76,10 @@ def format_scenario(report: DiagnosisReport, window: WorstWindow) -> str:
 
 
 def reproduction_commands(report: DiagnosisReport, folder: Path) -> list[tuple[str, str]]:
-    """Return what can be done with the variant: a description and a command each.
+    """Return what can be done with the variant: a description and a shell command each.
 
-    Without a diagnosis only the check is listed.
+    First come copies of effects that the project lacks and `modewright check`; with a diagnosis
+    also simulate, generate, lockstep and explain. Paths are in `folder` and quoted.
     """
     variant, scenario = (shlex.quote(str(folder / name)) for name in (VARIANT, SCENARIO))
     found = [
@@ -105,7 +109,10 @@ def _effect_copy_commands(report: DiagnosisReport, folder: Path) -> list[tuple[s
 
 
 def report_command(report: DiagnosisReport, folder: Path) -> str:
-    """Return the command that makes this report, quoted for a shell."""
+    """Return the `modewright diagnose` command that makes this report, quoted for a shell.
+
+    It has the model, `--train` and `--held-out` for each recording, and `--out`; no other options.
+    """
     words = ["modewright", "diagnose", report.name]
     for path in report.case.train:
         words += ["--train", str(path)]

@@ -28,10 +28,10 @@ class Card:
 def summary_cards(
     report: DiagnosisReport, residual_tests: Sequence[WhitenessTest] = ()
 ) -> list[Card]:
-    """Return the cards for location, confidence, improvement and caveats; those without lines are
-    left out.
+    """Return the cards on location, confidence, improvement and caveats, in this order.
 
-    `residual_tests` are whiteness tests of the final model. Without a diagnosis there are no cards.
+    `residual_tests` are whiteness tests of the final model; signals rated `coloured` are a caveat.
+    A card without lines is left out. Without a diagnosis there are no cards.
     """
     if report.diagnosis is None:
         return []

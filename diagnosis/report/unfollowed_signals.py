@@ -13,7 +13,11 @@ CONSTANT_MODEL_NRMSE = 1.0
 
 
 def unfollowed_signals(verdict: Verdict) -> Iterator[str]:
-    """Yield a message for each signal whose final misfit exceeds that of a constant, or is NaN."""
+    """Yield a message for each signal whose final misfit exceeds that of a constant, or is NaN.
+
+    The misfit of a constant is `CONSTANT_MODEL_NRMSE` (1). Each set of recordings (train, held out)
+    is considered by itself, in the order of the verdict.
+    """
     for part, signals in verdict.fit.items():
         for name, misfit in signals.items():
             share = misfit.nrmse_after
@@ -23,8 +27,9 @@ def unfollowed_signals(verdict: Verdict) -> Iterator[str]:
 
 
 def withdraw_nothing_missing(verdict: Verdict, unfollowed: Sequence[str]) -> Verdict:
-    """Return the verdict, with `nothing_missing`
-    changed to `unknown` if signals are not followed.
+    """Return the verdict, with `nothing_missing` changed to `unknown` if signals are not followed.
+
+    Another verdict, or one without `unfollowed` messages, is returned itself.
     """
     if unfollowed and verdict.verdict == "nothing_missing":
         return dataclasses.replace(verdict, verdict="unknown")

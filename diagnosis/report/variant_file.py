@@ -27,14 +27,19 @@ MIN_RELATIVE_CHANGE = 1e-6
 
 
 def variant_name(base: str, suffix: str = NAME_SUFFIX) -> str:
-    """Return a base's name with a suffix, shortened to `MAX_NAME_LENGTH`."""
+    """Return a base's name with a suffix; the base is cut so that there are at most 31 characters.
+
+    The limit is `MAX_NAME_LENGTH`; the suffix is never cut.
+    """
     return base[: MAX_NAME_LENGTH - len(suffix)] + suffix
 
 
 def format_variant(report: DiagnosisReport, extends: str) -> str:
     """Return the variant as YAML text; `extends` is the name or the file of the base.
 
-    Values are in SI; standard deviations and declared values are comments.
+    It has the parameters that changed by more than `MIN_RELATIVE_CHANGE` and the accepted effects
+    with their fitted values, in SI; standard deviations and declared values are comments, as are
+    `missing_effect_notes`. Without a diagnosis it has only the header and `about`.
     """
     lines = [
         "language: 1",
@@ -53,8 +58,9 @@ def format_variant(report: DiagnosisReport, extends: str) -> str:
 
 
 def missing_effect_notes(report: DiagnosisReport) -> list[str]:
-    """Return comments on effects that must be copied
-    into the project before the variant is read.
+    """Return a sentence for each of `missing_effects`: its file has to be copied below `spec/`.
+
+    They are without `#`. The variant finds these effects by name.
     """
     names = [effect.body.span.source.name for effect in missing_effects(report)]
     return [
@@ -63,7 +69,11 @@ def missing_effect_notes(report: DiagnosisReport) -> list[str]:
 
 
 def missing_effects(report: DiagnosisReport) -> list[Effect]:
-    """Return the accepted effects that the project does not have, or has with another text."""
+    """Return the accepted effects that the project does not have, or has with another text.
+
+    Empty without a diagnosis. Lines are compared exactly; an effect is there if one of several
+    files with its name is equal.
+    """
     project = report.case.project
     accepted = report.diagnosis.selection.accepted if report.diagnosis else ()
     found = []
