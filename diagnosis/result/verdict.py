@@ -60,7 +60,11 @@ class Verdict:
     inputs: Mapping[str, str] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
-        """Return the content of `verdict.json`; locations without a gain are left out."""
+        """Return the content of `verdict.json` in the format `modewright-verdict/1`.
+
+        Locations without a gain are left out, unless they are accepted; signals, modes and windows
+        are those of the first one that is left. Numbers that are not finite stay as they are.
+        """
         locations = [
             location for location in self.location if location.gain > 0.0 or location.is_accepted
         ]
