@@ -63,7 +63,8 @@ REJECTION_LEAD = 20.0
 def is_inadequate(model_set: ModelSet, selection: Selection, min_gain: float) -> bool:
     """Return whether free disturbances gain much beside the accepted effects.
 
-    The limit is `min_gain` [nats] or `MAX_REMAINING_FRACTION` of the effects' gain, the larger one.
+    Their gain (`free_disturbance_gain`) must exceed `min_gain` [nats] and `MAX_REMAINING_FRACTION`
+    (0.12) of the sum of the effects' penalised gains.
     """
     known = [
         tried.likelihood_gain.penalised for tried in selection.accepted if tried.likelihood_gain
@@ -74,11 +75,12 @@ def is_inadequate(model_set: ModelSet, selection: Selection, min_gain: float) ->
 
 
 def free_disturbance_gain(model_set: ModelSet, selection: Selection) -> float:
-    """Return the effective gain [nats] of free disturbances in all balances and elements.
+    """Return the effective gain [nats] of free disturbances in all balances and elastic elements.
 
-    Parameters are fitted with them. Elements are left out if the model with them has no finite
-    cost. An effect that varies slowly, such as a grade, excludes its place. Outputs are not
-    included, because a sensor error follows any error of the model.
+    Parameters are fitted with them. The elements are left out if the gain with them is not finite;
+    the result is infinite if that without them is not finite either. An effect that varies slowly,
+    such as a grade, excludes its place. Outputs are not included, because a sensor error follows
+    any error of the model. The gain is divided by the integrated autocorrelation.
     """
     inside = [
         placed_effect
@@ -108,7 +110,11 @@ def _disturbance_gain(
 
 
 def has_autocorrelated_residuals(model_set: ModelSet, selection: Selection) -> bool:
-    """Return whether innovations keep much of the autocorrelation that they had in the base."""
+    """Return whether innovations keep much of the autocorrelation that they had in the base.
+
+    The integrated autocorrelation of the final model must exceed `MIN_AUTOCORRELATION` (1.2), and
+    its excess over 1 must exceed `MAX_AUTOCORRELATION_RATIO` (0.25) of the excess of the base.
+    """
     before, after = (
         integrated_autocorrelation(one, model_set.series)
         for one in (selection.base, selection.model)
@@ -119,8 +125,12 @@ def has_autocorrelated_residuals(model_set: ModelSet, selection: Selection) -> b
 def has_autocorrelated_residuals_in_most(model_set: ModelSet, selection: Selection) -> bool:
     """Return whether innovations are autocorrelated, also in most recordings where the base's were.
 
-    The fraction that is left is compared for the median recording, because an inexact form shows in
-    those few that drive it far.
+    All recordings together must have at least `WITHDRAWAL_AUTOCORRELATION` (1.6), and either more
+    than `STRONG_AUTOCORRELATION` (3) or autocorrelated residuals. Then the median over recordings
+    of the fraction of the base's excess that is left must exceed `MAX_MEDIAN_RATIO` (0.2), or
+    `MAX_STRONG_MEDIAN_RATIO` (0.05) in the strong case; only recordings with more than
+    `MIN_AUTOCORRELATION` in the base count, and without any the result is True. An inexact form
+    shows in those few that drive it far.
     """
     together = integrated_autocorrelation(selection.model, model_set.series)
     is_loud = together > STRONG_AUTOCORRELATION
@@ -142,7 +152,8 @@ def has_autocorrelated_residuals_in_most(model_set: ModelSet, selection: Selecti
 def has_stacked_effects(selection: Selection) -> bool:
     """Return whether a further effect at the same place gains much of what the first one gained.
 
-    Two such effects together imitate a third one.
+    Its penalised gain must exceed `STACKED_FRACTION` (0.35) of that of the first accepted effect at
+    the same `section.place`. Two such effects together imitate a third one.
     """
     firsts: dict[str, float] = {}
     for tried in selection.accepted:
@@ -157,7 +168,12 @@ def has_stacked_effects(selection: Selection) -> bool:
 
 
 def lacks_simulation_improvement(model_set: ModelSet, selection: Selection) -> bool:
-    """Return whether effects of small gain leave the simulation misfit nearly unchanged."""
+    """Return whether effects of small gain leave the simulation misfit nearly unchanged.
+
+    The sum of their penalised gains must be at most `SMALL_GAIN` (800 nats), and the mean over
+    outputs of the ratio of normalised misfits, after over before, must exceed `MIN_MISFIT_RATIO`
+    (0.85).
+    """
     gained = sum(
         tried.likelihood_gain.penalised for tried in selection.accepted if tried.likelihood_gain
     )
@@ -168,7 +184,11 @@ def lacks_simulation_improvement(model_set: ModelSet, selection: Selection) -> b
 
 
 def reject_effects(selection: Selection) -> Selection:
-    """Return a selection without accepted effects in which no candidate is likely."""
+    """Return a selection without accepted effects and rivals in which no candidate is likely.
+
+    Its model is the base; `other` becomes the largest total gain of the first round, or `other`
+    itself if that is larger, plus `REJECTION_LEAD` (20 nats).
+    """
     totals = [
         tried.likelihood_gain.total for tried in selection.first_round if tried.likelihood_gain
     ]

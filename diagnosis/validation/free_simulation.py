@@ -29,7 +29,10 @@ FREE_TIME = 1.5
 def compare_misfits(
     before: Estimate, after: Estimate, series: Sequence[SampledRecording]
 ) -> dict[str, Misfit]:
-    """Return the misfit of each compared output for two models that are fitted to `series`."""
+    """Return the misfit of each compared output for two models that are fitted to `series`.
+
+    The misfits are those of `nrmse`, and times the standard deviation of the output in SI.
+    """
     first, second = nrmse(before, series), nrmse(after, series)
     names = before.candidate.predictor.outputs
     return {
@@ -39,8 +42,11 @@ def compare_misfits(
 
 
 def nrmse(model: Estimate, series: Sequence[SampledRecording]) -> Reals:
-    """Return the root mean square error of free
-    simulation over the standard deviation (outputs,).
+    """Return the root mean square error of free simulation over the standard deviation (outputs,).
+
+    Only known values in the free parts (`is_free`) of all recordings count; for a model with the
+    output-error criterion all after the burn-in. Values of a run that diverged do not count; an
+    output without values has 0.
     """
     squares, counts = [], []
     for one, simulated in zip(series, simulate_free(model, series), strict=True):
@@ -54,14 +60,19 @@ def nrmse(model: Estimate, series: Sequence[SampledRecording]) -> Reals:
 
 
 def output_stds(series: Sequence[SampledRecording]) -> Reals:
-    """Return the standard deviation [SI] of each compared output over all recordings (outputs,)."""
+    """Return the standard deviation [SI] of each compared output over all recordings (outputs,).
+
+    NaN is ignored; the result is at least 1e-12.
+    """
     spread = np.nanstd(np.concatenate([one.measured for one in series]), axis=0)
     return np.asarray(np.maximum(spread, 1e-12), dtype=np.float64)
 
 
 def simulate_free(model: Estimate, series: Sequence[SampledRecording]) -> list[Reals]:
-    """Return the outputs of a model for each recording (samples, outputs),
-    observed and free in turn.
+    """Return the outputs of a model, observed and free in turn, (samples, outputs) each.
+
+    An observer corrects the model for `OBSERVED_TIME` (1 s), then it runs freely for `FREE_TIME`
+    (1.5 s). The samples after a run diverged are NaN.
     """
     masked = [
         dataclasses.replace(one, measured=np.where(is_free(one)[:, None], np.nan, one.measured))
@@ -83,6 +94,10 @@ def is_after_burn_in(series: SampledRecording) -> NDArray[np.bool_]:
 
 
 def is_free(series: SampledRecording) -> NDArray[np.bool_]:
-    """Return the mask (samples,) of samples in free simulation."""
+    """Return the mask (samples,) of samples in free simulation.
+
+    These are the last `FREE_TIME` (1.5 s) of each period of `OBSERVED_TIME` + `FREE_TIME` (2.5 s)
+    from the first sample on.
+    """
     time = np.arange(series.count) * float(series.period)
     return np.asarray(np.mod(time, OBSERVED_TIME + FREE_TIME) >= OBSERVED_TIME)

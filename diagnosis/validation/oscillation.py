@@ -58,8 +58,10 @@ class Cycles:
         return float(np.mean(late)) if len(late) else float("nan")
 
     def frequency_trend(self) -> float:
-        """Return the relative frequency of small cycles over large ones, minus 1;
-        NaN without both.
+        """Return the mean frequency of small cycles over that of large ones, minus 1.
+
+        It is NaN without small or without large cycles. Small is below `SMALL_AMPLITUDE` (0.25) of
+        the largest amplitude, large is above `LARGE_AMPLITUDE` (0.5).
         """
         part = self.amplitudes / max(float(np.max(self.amplitudes, initial=0.0)), 1e-300)
         large, little = (
@@ -71,8 +73,10 @@ class Cycles:
         return float(np.mean(little) / np.mean(large) - 1.0)
 
     def damping_ratio(self) -> float:
-        """Return the damping ratio from the logarithmic decrement;
-        NaN for fewer than three cycles.
+        """Return the damping ratio from the logarithmic decrement; NaN for fewer than three cycles.
+
+        The decrement is the slope of a line through the logarithms of all amplitudes; cycles are
+        half a period apart. Negative if the oscillation grows.
         """
         if len(self.amplitudes) < 3:
             return float("nan")
@@ -98,7 +102,11 @@ class Oscillation:
 
     @property
     def has_other_frequency(self) -> bool:
-        """Whether the model stops following, and then has another frequency."""
+        """Whether the model stops following, and then has another frequency.
+
+        The mean frequencies of the cycles after `followed_time` must be known and differ by more
+        than `FREQUENCY_TOLERANCE` (2 %).
+        """
         rates = [
             one.mean_frequency_after(self.followed_time) for one in (self.recorded, self.simulated)
         ]
@@ -106,7 +114,13 @@ class Oscillation:
         return bool(known and abs(rates[0] / rates[1] - 1.0) > FREQUENCY_TOLERANCE)
 
     def format_sentence(self) -> str:
-        """Return in one sentence how long the model follows, and both frequencies after that."""
+        """Return in one sentence how long the model follows, and both frequencies after that.
+
+        It is "w fits to the end, 2.50 s after the step at 1.00 s of a.csv", or "w fits until t =
+        0.40 s after ..., then the shuffle's frequency is 3.10 Hz in the recording and 3.40 Hz in
+        the model", without frequencies if one is unknown. The trends with amplitude follow if they
+        differ by `FREQUENCY_TOLERANCE`, the damping ratios if they differ by 0.5 %.
+        """
         begin = f"after the step at {self.start:.2f} s of {self.recording}"
         if self.followed_time >= self.length:
             return f"{self.signal} fits to the end, {self.length:.2f} s {begin}"
@@ -142,8 +156,11 @@ class Oscillation:
 def analyse_oscillation(model: Estimate, series: Sequence[SampledRecording]) -> Oscillation | None:
     """Return the oscillation after the largest step of some recordings, recorded and simulated.
 
-    The model is corrected before the step and free after it. The result is None without a step, an
-    oscillation of at least two clear cycles, or a complete run.
+    The model is corrected before the step and free after it, for at most `MAX_TIME` (2.5 s). The
+    signal is the output with the largest oscillation relative to its noise. The model follows until
+    two samples in a row have an error above `MAX_ERROR_FRACTION` (0.35) of the amplitude and
+    `MIN_NOISE_RATIO` (8) times the noise. The result is None without a step, at least two clear
+    cycles in both, or a complete run.
     """
     place = _largest_step(series)
     if place is None:

@@ -44,7 +44,10 @@ def rejects_constancy(
 ) -> bool:
     """Return whether an effect is rejected because its parameters differ between recordings.
 
-    Both the predicted and the simulated gain of separate values must exceed the limit.
+    The gain [nats] of separate parameter values for each recording, both predicted and simulated,
+    must exceed the larger of `VARIATION_GAIN` (20) and a fraction of the effect's gain:
+    `DELAY_REJECTION_FRACTION` (0.06) for a lag or delay that is the only accepted effect
+    (`is_only_effect`), else `REJECTION_FRACTION` (0.2).
     """
     part = (
         DELAY_REJECTION_FRACTION
@@ -58,8 +61,9 @@ def rejects_constancy(
 
 
 def is_lag_or_delay(placed_effect: PlacedEffect) -> bool:
-    """Return whether an effect has a parameter that
-    is a time and whose neutral value is `absent`.
+    """Return whether an effect has a parameter that is a time and has `neutral: absent`.
+
+    The unit of its declared value must have the dimension of a time.
     """
     known = placed_effect.effect.body.get("parameters")
     entries = known if isinstance(known, MappingNode) else ()
@@ -85,7 +89,11 @@ def _is_time_with_absent_neutral(parameter: MappingNode) -> bool:
 def has_varying_parameters(
     model: Estimate, candidate_fit: CandidateFit, series: Sequence[SampledRecording]
 ) -> bool:
-    """Return whether the parameters of an effect vary between recordings, by the predicted gain."""
+    """Return whether the parameters of an effect vary between recordings.
+
+    The predicted gain of separate values (`heterogeneity_score`) must exceed the larger of
+    `VARIATION_GAIN` (20 nats) and `VARIATION_FRACTION` (0.012) of the effect's gain.
+    """
     return heterogeneity_score(model, candidate_fit.placed_effect, series) > max(
         VARIATION_GAIN, VARIATION_FRACTION * candidate_fit.gain
     )
@@ -96,7 +104,8 @@ def heterogeneity_score(
 ) -> float:
     """Return the predicted gain [nats] of separate parameter values beyond the gain from noise.
 
-    This is the score test (Rao 1948) of equal against separate values, all else fixed.
+    This is the score test (Rao 1948) of equal against separate values of the effect's shared
+    parameters, all else fixed; it can be negative. The result is 0 without normal equations.
     """
     steps = _recording_steps(model, placed_effect, series)
     return sum(step.predicted_gain - step.expected_gain for step in steps)
@@ -105,9 +114,10 @@ def heterogeneity_score(
 def simulated_heterogeneity(
     model: Estimate, placed_effect: PlacedEffect, series: Sequence[SampledRecording]
 ) -> float:
-    """Return the gain [nats] of separate values in simulations, beyond the gain from noise.
+    """Return the gain [nats] of separate values in predictions, beyond the gain from noise.
 
-    Steps are shortened if that is better, because predictions are local.
+    Each recording takes the best of the steps of `heterogeneity_score`, shortened by
+    `STEP_FRACTIONS`, or no step. The result is 0 without normal equations and can be negative.
     """
     steps = _recording_steps(model, placed_effect, series)
     if not steps:

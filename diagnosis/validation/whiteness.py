@@ -45,26 +45,31 @@ class WhitenessTest:
 
     @property
     def is_white(self) -> bool:
-        """Whether the test does not reject whiteness."""
+        """Whether `p_value` is at least `SIGNIFICANCE_LEVEL` (0.01)."""
         return self.p_value >= SIGNIFICANCE_LEVEL
 
     @property
     def rating(self) -> str:
-        """The result in words."""
+        """The result in words: `white`, `nearly white` or `coloured`.
+
+        It is `white` if `is_white`, else `nearly white` below a predictable fraction of
+        `NEGLIGIBLE_FRACTION` (0.05).
+        """
         if self.is_white:
             return "white"
         return "nearly white" if self.predictable_fraction < NEGLIGIBLE_FRACTION else "coloured"
 
     @property
     def lags_outside_band(self) -> int:
-        """The number of lags outside the band."""
+        """The number of lags whose |correlation| exceeds the 99 % band."""
         return int(np.sum(np.abs(self.correlations) > self.band))
 
 
 def innovation_whiteness(model: Estimate, period: float) -> list[WhitenessTest]:
-    """Return the test of the innovations of each compared output; `period` [s].
+    """Return the Ljung-Box test of the innovations of each compared output, in their order.
 
-    Innovations are clipped at the Huber limits.
+    `period` is the time [s] between samples. Innovations after the burn-in are used, clipped at the
+    Huber limits.
     """
     prediction = model.prediction
     names = model.candidate.predictor.outputs
@@ -80,7 +85,9 @@ def ljung_box(name: str, parts: Sequence[Reals], period: float) -> WhitenessTest
     """Return the test of a signal given in parts, NaN where unknown; `period` [s].
 
     The statistic is the sum over lags of the number of pairs times the squared autocorrelation; it
-    has a chi-squared distribution with as many degrees of freedom as lags. There are up to 60 lags.
+    has a chi-squared distribution with as many degrees of freedom as lags. The lags reach to
+    `MAX_LAG_TIME` (0.25 s), `MAX_LAGS` (60) samples or a quarter of the shortest part, whichever is
+    least, but there is one at least. The mean is not subtracted.
     """
     shortest = min(len(part) for part in parts)
     count = max(1, min(MAX_LAGS, round(MAX_LAG_TIME / period), shortest // 4))

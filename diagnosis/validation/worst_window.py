@@ -38,7 +38,10 @@ class WorstWindow:
 
 @dataclass(frozen=True)
 class FreeRuns:
-    """Free simulations of recordings by two models, (samples, outputs) each, in SI."""
+    """Outputs [SI] of recordings by two models, observed and free in turn.
+
+    Each has the shape (samples, outputs).
+    """
 
     series: Sequence[SampledRecording]
     before: Sequence[Reals]
@@ -49,16 +52,15 @@ class FreeRuns:
 def simulate_free_runs(
     base: Estimate, model: Estimate, series: Sequence[SampledRecording]
 ) -> FreeRuns:
-    """Return the free simulations of the base and of the model."""
+    """Return the outputs of base and model, observed and free in turn, as by `simulate_free`."""
     names = tuple(base.candidate.predictor.outputs)
     return FreeRuns(series, simulate_free(base, series), simulate_free(model, series), names)
 
 
 def rms_by_recording(runs: FreeRuns) -> list[tuple[str, Reals, Reals]]:
-    """Return the name and the root mean square errors of each recording, before and after
-    (outputs,).
+    """Return name and root mean square errors [SI] of each recording, before and after (outputs,).
 
-    Only samples in free simulation count; the values are in SI.
+    Only known values in the free parts (`is_free`) count; an output without any has NaN.
     """
     found = []
     for one, before, after in zip(runs.series, runs.before, runs.after, strict=True):
@@ -69,10 +71,12 @@ def rms_by_recording(runs: FreeRuns) -> list[tuple[str, Reals, Reals]]:
 
 
 def find_worst_window(runs: FreeRuns, units: Sequence[str], label: str) -> WorstWindow:
-    """Return the window with the largest squared error of the base, normalised by the signals'
-    spread.
+    """Return the window with the largest sum of normalised squared errors of the base.
 
-    `label` names the set of recordings in the title.
+    Windows are `OBSERVED_TIME` + `FREE_TIME` (2.5 s) long and adjacent, the last one of a recording
+    may be shorter; only errors after `OBSERVED_TIME` count, over the standard deviation of the
+    signal in all recordings. The first of equal windows is taken. `label` names the set of
+    recordings in the title, `units` are those of the signals.
     """
     series, before, after = runs.series, runs.before, runs.after
     spread = np.nanstd(np.concatenate([one.measured for one in series]), axis=0)
