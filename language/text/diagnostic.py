@@ -48,9 +48,10 @@ class Span:
     is_atomic: bool = False
 
     def subspan(self, offset: int, width: int = 1) -> Span:
-        """Return the span that starts `offset` characters after the start of this one.
+        """Return the span that starts `offset` characters after the start of this one, on its line.
 
-        An atomic span returns itself. A width below 1 becomes 1.
+        An atomic span returns itself. A width below 1 becomes 1. The end is not limited to that of
+        this span.
         """
         if self.is_atomic:
             return self
@@ -111,7 +112,10 @@ class Problems:
         return any(p.severity == "error" for p in self.reported)
 
     def raise_if_errors(self) -> None:
-        """Raise SpecError with all problems, warnings included, if one of them is an error."""
+        """Raise SpecError with all problems, warnings included, if one of them is an error.
+
+        With warnings only, or without problems, nothing happens.
+        """
         if self.has_errors:
             raise SpecError(self.reported)
 
@@ -119,8 +123,8 @@ class Problems:
     def collect_errors(self) -> Iterator[None]:
         """Return a context that catches a SpecError of its body and appends its problems.
 
-        If the problems of the error begin with those that this collector already holds, only the
-        remaining ones are appended.
+        If the problems of the error begin with all that this collector holds, only the remaining
+        ones are appended. The SpecError does not leave the context; other exceptions do.
         """
         try:
             yield
@@ -133,7 +137,8 @@ class Problems:
 def suggest_name(name: str, candidates: Iterable[str]) -> str:
     """Return "did you mean `x`?" with the candidate most similar to `name`, or an empty text.
 
-    The text is empty if no candidate has a similarity of at least SIMILARITY_CUTOFF.
+    The text is empty if no candidate has a similarity (difflib) of at least SIMILARITY_CUTOFF. Of
+    equally similar candidates the alphabetically last one is taken.
     """
     matches = difflib.get_close_matches(name, sorted(candidates), n=1, cutoff=SIMILARITY_CUTOFF)
     return f"did you mean `{matches[0]}`?" if matches else ""
@@ -142,9 +147,12 @@ def suggest_name(name: str, candidates: Iterable[str]) -> str:
 def render_problem(problem: Problem) -> str:
     """Return a problem as text: `file:line:col: severity: label [code]`, source line, carets, help.
 
-    The source line and the carets are left out if the source does not have that line, the help if
-    it is empty. A last line names the effect if an effect inserted the text. Invisible characters
-    are escaped.
+    The parts are lines; the source line and the carets are indented by two blanks, and the help
+    begins with `help: `. Source line and carets are left out if the source does not have that line,
+    help and code if they are empty. A last line `in <layer>, applied at <place>` follows if an
+    effect inserted the text. Label and help are cut to MAX_LABEL_LENGTH, the source line to
+    MAX_LINE_LENGTH around the place; invisible characters are escaped (in the source line
+    replaced).
     """
     span = problem.span
     code = f" [{problem.code}]" if problem.code else ""
@@ -163,13 +171,20 @@ def render_problem(problem: Problem) -> str:
 
 
 def sort_problems(problems: Iterable[Problem]) -> list[Problem]:
-    """Return the problems without duplicates, sorted by file, line, column and label."""
+    """Return the problems sorted by name of the file, line, column and label, each once.
+
+    Problems are duplicates if all their fields are equal.
+    """
     unique = dict.fromkeys(problems)
     return sorted(unique, key=lambda p: (p.span.source.name, p.span.line, p.span.column, p.label))
 
 
 def render_all(problems: Iterable[Problem]) -> str:
-    """Return all problems as one text, sorted by place and separated by blank lines."""
+    """Return the problems as one text, each once, sorted by place and separated by blank lines.
+
+    Each is formatted by `render_problem`, in the order of `sort_problems`. Without problems the
+    text is empty.
+    """
     return "\n\n".join(render_problem(problem) for problem in sort_problems(problems))
 
 

@@ -32,7 +32,10 @@ class ScalarNode:
 
     @property
     def text_span(self) -> Span:
-        """The span of the text without quotes; atomic if an overlay rewrote the text."""
+        """The span of the text without quotes; atomic if an overlay rewrote a part of the text.
+
+        In that case the quotes are part of the span.
+        """
         if self.changes:
             return dataclasses.replace(self.span, is_atomic=True)
         return self.span.subspan(1, len(self.text)) if self.is_quoted else self.span
@@ -48,7 +51,10 @@ class Entry:
 
     @property
     def text_span(self) -> Span:
-        """The span of the key without its quotes."""
+        """The span of the key without its quotes.
+
+        A key is taken as quoted if its span is 2 characters wider than its text.
+        """
         is_quoted = self.span.width == len(self.key) + 2
         return self.span.subspan(1, len(self.key)) if is_quoted else self.span
 
@@ -61,7 +67,7 @@ class MappingNode:
     span: Span
 
     def get(self, key: str) -> YamlNode | None:
-        """Return the node of a key, or None if the mapping does not have the key."""
+        """Return the node of a key of this mapping, or None if the mapping does not have the key."""
         entry = self.entries.get(key)
         return entry.node if entry else None
 
@@ -93,7 +99,11 @@ class Document:
 
 
 def require_kind(document: Document, kind: str, problems: Problems) -> None:
-    """Raise SpecError if a document is not of the kind `kind`; report the problem, too."""
+    """Raise SpecError if the kind of a document is not `kind`; else do nothing.
+
+    The problem, of kind "form" at the name of the document, is added to `problems` first; the error
+    carries all problems of the collector.
+    """
     if document.kind != kind:
         actual_text, expected_text = (
             f"{'an' if word[0] in 'aeiou' else 'a'} {word}" for word in (document.kind, kind)
@@ -106,8 +116,10 @@ def require_kind(document: Document, kind: str, problems: Problems) -> None:
 def read_text(path: Path, display_name: str | None = None) -> tuple[Source, str]:
     """Return the source and the text of a UTF-8 file; a byte order mark is removed.
 
-    The source has the name `display_name`, or else the path. Raises SpecError if the file does not
-    exist, is not a regular file, is larger than MAX_BYTES or is not UTF-8.
+    The source has the name `display_name`, or else the path, and the lines of the text. Raises
+    SpecError with one problem at line 1: "unreadable" if the file does not exist or is not a
+    regular file, "huge" if it is larger than MAX_BYTES; or "binary" at the first line that is not
+    UTF-8.
     """
     name = display_name or str(path)
     place = Span(Source(name), 1, 1)
@@ -140,8 +152,8 @@ def read_text(path: Path, display_name: str | None = None) -> tuple[Source, str]
 
 
 def lines_of(text: str) -> tuple[str, ...]:
-    """Return the lines of a text as YAML counts them, without line ends.
+    r"""Return the lines of a text as YAML counts them (LINE_END), without line ends.
 
-    An empty text has no lines.
+    One `\n` at the end of the text starts no further line. An empty text has no lines.
     """
     return tuple(LINE_END.split(text.removesuffix("\n"))) if text else ()

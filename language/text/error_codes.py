@@ -96,10 +96,10 @@ NO_CODE = ("", "")
 
 
 def code_of(kind: str) -> str:
-    """Return the code of a kind of problem, or an empty text for an unknown kind."""
+    """Return the code of a kind of problem, like `MW201`, or an empty text for an unknown kind."""
     return CODES.get(kind, NO_CODE)[0]
 
 
 def meaning_of(kind: str) -> str:
-    """Return the meaning of a kind of problem as a sentence; empty for an unknown kind."""
+    """Return the meaning of a kind of problem as a sentence; an empty text for an unknown kind."""
     return CODES.get(kind, NO_CODE)[1]

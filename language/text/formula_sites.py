@@ -60,7 +60,10 @@ def map_formulas(
 ) -> MappingNode:
     """Return a copy of a tree in which each scalar at one of the sites is replaced by `transform`.
 
-    `transform` gets the key path and the scalar. Keys, spans and all other values stay as they are.
+    `sites` maps keys to the sites below them; the key `*` stands for all keys that are not given,
+    and ALL_SCALARS for every scalar at any depth below, items of sequences included, except below
+    NON_FORMULA_KEYS. `transform` gets the key path from the root and the scalar; an item has the
+    path of its sequence. Keys, spans and all other values stay as they are.
     """
     node = _map_node(tree, sites, transform, ())
     assert isinstance(node, MappingNode)

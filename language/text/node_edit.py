@@ -12,21 +12,24 @@ from language.text.document import Entry, MappingNode, ScalarNode, SequenceNode,
 def mapping_entries(node: YamlNode | None) -> Iterator[Entry]:
     """Yield the entries of a mapping in the order of the file.
 
-    Another kind of node, or None, has no entries.
+    A scalar, a sequence and None have no entries.
     """
     if isinstance(node, MappingNode):
         yield from node
 
 
 def scalars_of(node: YamlNode | None) -> tuple[ScalarNode, ...]:
-    """Return the scalars of a sequence, a scalar itself as a tuple, or an empty tuple."""
+    """Return the scalars among the items of a sequence, or a scalar itself as a tuple.
+
+    Nested sequences and mappings are left out. A mapping, or None, gives an empty tuple.
+    """
     if isinstance(node, SequenceNode):
         return tuple(item for item in node.nodes if isinstance(item, ScalarNode))
     return (node,) if isinstance(node, ScalarNode) else ()
 
 
 def find_node(tree: MappingNode, path: Sequence[str]) -> YamlNode | None:
-    """Return the node at a path of keys, or None if a key is absent.
+    """Return the node at a path of keys, or None if a key is absent or a value above is no mapping.
 
     An empty path gives the tree itself.
     """
@@ -39,7 +42,9 @@ def find_node(tree: MappingNode, path: Sequence[str]) -> YamlNode | None:
 def put_node(tree: MappingNode, path: Sequence[str], node: YamlNode) -> MappingNode:
     """Return a copy of a tree with `node` at a path of keys; create missing mappings.
 
-    A value at the path is replaced. A key that exists already keeps its span.
+    A value at the path is replaced, and so is a scalar or a sequence above it (by a mapping). A key
+    that exists already keeps its place and its span; a new one comes last and has the span of
+    `node`. Raises ValueError for an empty path.
     """
     key, *rest = path
     if rest:
@@ -52,9 +57,9 @@ def put_node(tree: MappingNode, path: Sequence[str], node: YamlNode) -> MappingN
 
 
 def replace_source(node: YamlNode, source: Source) -> YamlNode:
-    """Return a copy of a tree in which every span refers to `source`.
+    """Return a copy of a tree in which the spans of all keys and values refer to `source`.
 
-    Lines and columns stay the same.
+    Lines and columns stay the same, and so do the `changes` of scalars.
     """
     span = _replace_span_source(node.span, source)
     match node:
@@ -80,7 +85,10 @@ def _replace_span_source(span: Span, source: Source) -> Span:
 
 
 def format_inline(node: YamlNode) -> str:
-    """Return a node as YAML on one line: `{points: {0 degC: 10 N*m, 40 degC: 12.5 N*m}}`."""
+    """Return a node as YAML on one line: `{points: {0 degC: 10 N*m, 40 degC: 12.5 N*m}}`.
+
+    A sequence is `[a, b]`. Scalars and keys are printed without quotes, even if YAML needs them.
+    """
     if isinstance(node, MappingNode):
         return f"{{{', '.join(f'{entry.key}: {format_inline(entry.node)}' for entry in node)}}}"
     if isinstance(node, SequenceNode):

@@ -11,10 +11,11 @@ def apply_overlay(
 ) -> MappingNode:
     """Return `base` merged with `overlay` (docs/language.md, "Variants, effects, calibrations").
 
-    Mappings are merged key by key at every depth. A scalar or a sequence replaces the value of the
-    base. `{remove: true}` removes a key; it is an error if the base does not have the key. A value
-    equal to that of the base gives a warning unless `is_template` is true. Problems are added to
-    `problems`.
+    Mappings are merged key by key at every depth; keys of the base keep their order, new keys
+    follow. Any other value replaces that of the base. `{remove: true}` removes a key; it is an
+    error if the base does not have the key, also below a new key. A scalar or a sequence equal to
+    that of the base gives a warning unless `is_template` is true. Problems, all of kind "overlay",
+    are added to `problems`; nothing is raised.
     """
     entries = dict(base.entries)
     for entry in overlay:
@@ -33,7 +34,10 @@ def apply_overlay(
 
 
 def without_keys(mapping: MappingNode, *keys: str) -> MappingNode:
-    """Return a copy of a mapping without the given keys; absent keys are ignored."""
+    """Return a copy of a mapping without the given keys; absent keys are ignored.
+
+    Keys of mappings below stay.
+    """
     entries = {key: entry for key, entry in mapping.entries.items() if key not in keys}
     return MappingNode(entries, mapping.span)
 

@@ -22,7 +22,11 @@ RECORDINGS_ENV = "MODEWRIGHT_RECORDINGS"
 
 
 def path_exists(path: Path) -> bool:
-    """Return whether a path exists; a path that the operating system rejects does not exist."""
+    """Return whether a path exists, as file or folder.
+
+    A path that the operating system rejects (too long, a NUL character, no permission) does not
+    exist.
+    """
     try:
         return path.exists()
     except (OSError, ValueError):
@@ -30,7 +34,10 @@ def path_exists(path: Path) -> bool:
 
 
 def project_root_of(file: Path) -> Path:
-    """Return the nearest folder above a file that contains `spec/`; else the file's folder."""
+    """Return the nearest folder above a file that contains a folder `spec`; else the file's folder.
+
+    Symbolic links are resolved. The file need not exist.
+    """
     parents = file.resolve().parents
     return next((parent for parent in parents if (parent / "spec").is_dir()), parents[0])
 
@@ -38,9 +45,10 @@ def project_root_of(file: Path) -> Path:
 def require_inside_project(path: Path, span: Span, root: Path) -> None:
     """Raise SpecError if a spec names a file outside of its project; symbolic links are resolved.
 
-    Allowed are `root`, the project of the spec at `span`, the specs of the distribution and the
-    folder of recordings. There is no check if ALLOW_OUTSIDE_ENV is set, or if the named file or the
-    file of `span` does not exist.
+    `path` is the named file and `span` the place that names it. Allowed are files below `root`, the
+    project of the file of `span`, the specs of the distribution and the folder in RECORDINGS_ENV.
+    There is no check if ALLOW_OUTSIDE_ENV is set, or if the named file or the file of `span` does
+    not exist.
     """
     named_in = Path(span.source.name)
     if os.environ.get(ALLOW_OUTSIDE_ENV) or not path_exists(path) or not path_exists(named_in):
@@ -96,13 +104,18 @@ class Project:
     def index(self) -> dict[str, list[Path]]:
         """Files by the name of their document; those of the project hide those of the distribution.
 
-        If an effect and another document have the same name, the index has the other document.
+        The heads of all `*.yaml` files below `spec/` count. A name has all its files of the
+        project, but one file of the distribution at most. If an effect and another document have
+        the same name, the index has the other document.
         """
         return {**self.effect_index, **self._index_by_name(lambda kind: kind != "effect")}
 
     @cached_property
     def effect_index(self) -> dict[str, list[Path]]:
-        """Files of effects by name; those of the project hide those of the distribution."""
+        """Files of effects by name; those of the project hide those of the distribution.
+
+        The documents of other kinds are not in it.
+        """
         return self._index_by_name(lambda kind: kind == "effect")
 
     def _index_by_name(self, is_wanted: Callable[[str], bool]) -> dict[str, list[Path]]:
@@ -127,23 +140,29 @@ class Project:
         return tuple(_heads_below(self.root / "spec", self.texts))
 
     def read(self, path: Path) -> Document:
-        """Return the document of a file; the text of an editor has precedence. Raises SpecError."""
+        """Return the document of a file; a text in `texts` is read instead of the file on the disk.
+
+        Raises SpecError as `read_document`.
+        """
         text = self.texts.get(path.resolve()) if self.texts else None
         return read_document(path) if text is None else parse_document(source_of(path, text), text)
 
     def read_effect_document(self, name: str, span: Span) -> Document:
-        """Return the document of the effect `name`.
+        """Return the document of the effect `name`, searched in `effect_index` only.
 
-        Raises SpecError if there is none or more than one.
+        Raises SpecError, with a problem at `span`, if there is none or more than one; also if the
+        file has problems.
         """
         return self.read(self._unique_path(self.effect_index, name, span, "effect"))
 
     def path_of(self, reference: str, span: Span | None = None) -> Path:
         """Return the file that a name or a path refers to.
 
-        A reference with the suffix of YAML or with a path separator is a path: relative to the file
-        of `span`, or to the working directory if it does not exist there. Raises SpecError for a
-        path outside of the project, and for a name that has no file or several.
+        A reference that ends in `.yaml` or `.yml`, or contains a path separator, is a path:
+        relative to the file of `span`, or to the working directory if it does not exist there or
+        `span` is None. Whether it exists is not checked. Any other reference is a name in `index`.
+        Raises SpecError for a name that has no file or several, and, with `span`, for a path
+        outside of the project.
         """
         if reference.endswith((".yaml", ".yml")) or os.sep in reference:
             base = Path(span.source.name).parent if span else Path()
@@ -178,7 +197,7 @@ class Project:
 
 
 def display_path(path: Path) -> str:
-    """Return a path for messages: relative if below the working directory, else as it is."""
+    """Return a path for messages: relative if below the working directory, else as it is given."""
     try:
         relative = os.path.relpath(path)
     except ValueError:
@@ -187,21 +206,28 @@ def display_path(path: Path) -> str:
 
 
 def read_document(path: Path) -> Document:
-    """Return the document of a file. Raises SpecError."""
+    """Return the document of a file; its source is named by `display_path`.
+
+    Raises SpecError as `read_text`, `parse_yaml` and `parse_document`.
+    """
     source, text = read_text(path, display_path(path))
     return parse_document(source, text)
 
 
 def source_of(path: Path, text: str) -> Source:
-    """Return the source for a text that an editor shows instead of the file."""
+    """Return the source for a text that an editor shows instead of the file `path`.
+
+    Its name is that of `display_path`; the file is not read.
+    """
     return Source(display_path(path), lines_of(text))
 
 
 def parse_document(source: Source, text: str) -> Document:
-    """Return the document of a text. Raises SpecError.
+    """Return the document of a text: kind and name from its head, and the tree.
 
-    The text needs `language: 1` and exactly one key of DOCUMENT_KINDS with the name of the
-    document.
+    The text needs `language: 1` and exactly one key of DOCUMENT_KINDS, followed by the name of the
+    document as a scalar; the key `scenario` of a test does not count. Raises SpecError with all
+    problems of these, or those of `parse_yaml`. The name itself and all other keys are not checked.
     """
     root = parse_yaml(source, text)
     problems = Problems()

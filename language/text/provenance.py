@@ -32,7 +32,7 @@ class Origin:
     layer: str
 
     def __str__(self) -> str:
-        """Return `file:line (layer)`."""
+        """Return `file:line (layer)`, or `file:line` without a layer."""
         return f"{self.place} ({self.layer})" if self.layer else self.place
 
 
@@ -47,7 +47,7 @@ class ProvenanceEntry:
 
     @property
     def places(self) -> str:
-        """All origins as one text, separated by `, changed by `."""
+        """The origin and the origins of the changes as one text, separated by `, changed by `."""
         return ", changed by ".join(str(origin) for origin in (self.origin, *self.changes))
 
 
@@ -61,12 +61,21 @@ class SpecDifference:
 
 
 def provenance_entries(tree: MappingNode) -> list[ProvenanceEntry]:
-    """Return every scalar, sequence and empty mapping of a tree in the order of the tree."""
+    """Return an entry for each scalar, sequence and empty mapping, in the order of the tree.
+
+    A path is the keys joined with `.`. A sequence is one entry with the text `[a, b]`, in which
+    items that are not scalars are `...`; an empty mapping has the text `{}`. The root has no entry.
+    """
     return list(_iter_entries(tree, ()))
 
 
 def format_spec(tree: MappingNode) -> str:
-    """Return a tree as the YAML text of a spec, with the places of each value as a comment."""
+    """Return a tree as the YAML text of a spec, with the places of each value as a comment.
+
+    Each level is indented by two blanks, and a sequence is on one line. Comments start at
+    COMMENT_COLUMN or after a longer line. Texts that do not match PLAIN_SCALAR are in double
+    quotes.
+    """
     return (
         "\n".join(_spec_lines(tree, 0, {row.path: row for row in provenance_entries(tree)}, ()))
         + "\n"
@@ -74,9 +83,10 @@ def format_spec(tree: MappingNode) -> str:
 
 
 def diff_specs(old: MappingNode, new: MappingNode) -> list[SpecDifference]:
-    """Return the key paths whose values differ between two trees.
+    """Return the key paths whose values differ as text, or that only one of two trees has.
 
-    The paths of `old` come first, then the paths that only `new` has; spans do not count.
+    The paths of `old` come first, then the paths that only `new` has, each in the order of its
+    tree; spans and the order of keys do not count. The paths are those of `provenance_entries`.
     """
     before = {row.path: row for row in provenance_entries(old)}
     after = {row.path: row for row in provenance_entries(new)}
@@ -91,7 +101,8 @@ def diff_specs(old: MappingNode, new: MappingNode) -> list[SpecDifference]:
 def format_diff(changes: Sequence[SpecDifference]) -> str:
     """Return differences as lines `- path: value` (old) and `+ path: value` (new).
 
-    Each line has the places of the value as a comment.
+    A missing value has no line. Each line has the places of the value as a comment at
+    COMMENT_COLUMN and ends with a line feed. Without differences the text is empty.
     """
     lines = []
     for difference in changes:
@@ -131,9 +142,10 @@ def _origin_of(span: Span) -> Origin:
 
 
 def layer_of(source: Source) -> str:
-    """Return the layer of a source: the effect with its place, or else kind and name of the file.
+    """Return the layer of a source: its `layer` (an effect with its place), or else `kind name`.
 
-    The text is empty if the source has neither.
+    Kind and name are those of the first line that is a head, like `variant leaf`. The text is empty
+    if the source has neither.
     """
     if source.layer:
         return source.layer

@@ -19,12 +19,20 @@ class RequirementUse:
 
 
 def requirements_of(mapping: MappingNode) -> tuple[str, ...]:
-    """Return the names under the key `req` of a mapping; empty without the key."""
+    """Return the names under the key `req` of a mapping, a scalar or a sequence, in their order.
+
+    Empty texts and items that are not scalars are left out; repetitions stay. Mappings below are
+    not searched. Without the key the result is empty.
+    """
     return tuple(item.text for item in _requirement_scalars(mapping))
 
 
 def find_requirements(node: YamlNode, path: tuple[str, ...] = ()) -> Iterator[RequirementUse]:
-    """Yield every reference to a requirement in a tree, in the order of the file."""
+    """Yield every reference to a requirement in a tree: those of a mapping, then those below it.
+
+    Mappings inside sequences are not searched. `path` has the keys from the root to `node`; the
+    path of a use is the keys to its mapping, joined with `.`.
+    """
     if not isinstance(node, MappingNode):
         return
     for item in _requirement_scalars(node):
@@ -34,7 +42,10 @@ def find_requirements(node: YamlNode, path: tuple[str, ...] = ()) -> Iterator[Re
 
 
 def all_requirements(*trees: MappingNode) -> tuple[str, ...]:
-    """Return the requirements named in the trees, each once, in order of first occurrence."""
+    """Return the requirements named in the trees, each once, in order of first occurrence.
+
+    All mappings that `find_requirements` searches count, tree by tree.
+    """
     return tuple(dict.fromkeys(each.requirement for t in trees for each in find_requirements(t)))
 
 

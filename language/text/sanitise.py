@@ -11,7 +11,11 @@ MAX_LINE_LENGTH = 160
 
 
 def escape_invisible(text: str) -> str:
-    r"""Return a text with invisible characters as escapes like `\x1b` or `\u200b`."""
+    r"""Return a text with invisible characters as escapes like `\x1b` or `\u200b`.
+
+    Invisible are the characters of INVISIBLE_CATEGORIES, tabs and line ends included. Those below
+    U+0100 have two hexadecimal digits, the others at least four.
+    """
     return "".join(
         _escape(c) if unicodedata.category(c) in INVISIBLE_CATEGORIES else c for c in text
     )
@@ -20,7 +24,8 @@ def escape_invisible(text: str) -> str:
 def mask_invisible(text: str) -> str:
     """Return a text of the same length with tabs as blanks and invisible characters as U+FFFD.
 
-    Carets printed below the text stay aligned.
+    Invisible are the characters of INVISIBLE_CATEGORIES. Carets printed below the text stay
+    aligned.
     """
     characters = (" " if c == "\t" else c for c in text)
     return "".join(
@@ -29,15 +34,20 @@ def mask_invisible(text: str) -> str:
 
 
 def truncate(text: str, max_length: int = MAX_LINE_LENGTH) -> str:
-    """Return a text cut to at most `max_length` characters; a text that is cut ends in `...`."""
+    """Return a text cut to at most `max_length` characters; a text that is cut ends in `...`.
+
+    The dots are part of the length.
+    """
     return text if len(text) <= max_length else text[: max_length - 3] + "..."
 
 
 def crop_line(text: str, column: int, width: int) -> tuple[str, int, int]:
-    """Return a part of a line of at most MAX_LINE_LENGTH characters around a place.
+    """Return the part of a line that is printed around a place, and the place within the part.
 
-    `column` counts from 1. The result also has the column and the width of the place within the
-    part. A short line is returned unchanged.
+    The result is (part, column, width); columns count from 1. A line of up to MAX_LINE_LENGTH
+    characters is returned unchanged. Of a longer one the part starts a quarter of MAX_LINE_LENGTH
+    before the place, or at the start of the line, has at most MAX_LINE_LENGTH characters and no
+    dots; the width ends at the end of the part.
     """
     if len(text) <= MAX_LINE_LENGTH:
         return text, column, width

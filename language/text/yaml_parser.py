@@ -24,9 +24,12 @@ MAX_PROBLEMS = 100
 
 
 def parse_yaml(source: Source, text: str) -> MappingNode:
-    """Return the tree of a YAML text. Raises SpecError with all problems of form if there are any.
+    """Return the tree of a YAML text; values stay texts, and keys keep the order of the file.
 
-    The root has to be a mapping. Values stay texts; no anchor, alias or tag is resolved.
+    Raises SpecError with the problems found: text that is not YAML, anchors, aliases, tags, merge
+    keys, duplicate keys, keys that are no scalars, a value split at a comma in `{...}`, a second
+    document, an empty text, a root that is no mapping. Parsing stops after MAX_PROBLEMS problems,
+    at an error of YAML, below MAX_DEPTH levels and after MAX_NODES nodes.
     """
     problems = Problems()
     builder = _YamlBuilder(source, problems)
