@@ -19,8 +19,11 @@ EVALUATION_POINT_PREFIX = "at_"
 def formula_name(expr: Expr) -> str:
     """Return an identifier for an expression: `m_g_r_w`, `per_J_v`, `r_w_cubed`, `half_h`.
 
-    The result is FALLBACK_NAME if the expression is of a kind without a name (comparison, choice,
-    array element), or if the name would be too long or begin with a digit. Names are not unique.
+    Variables lose their group and `at_`. A product joins its names with `_`; sums and quotients
+    insert `plus`, `minus` and `per`; a call starts with its function; 0.5 is `half` and 2 is
+    `twice`. The result is FALLBACK_NAME if the expression contains a kind without a name
+    (comparison, choice, array element, `and`, `or`), or if the name is longer than MAX_NAME_LENGTH
+    or begins with a digit. Names are not unique.
     """
     name = re.sub(r"[^A-Za-z0-9_]+", "_", _build_name(expr)).strip("_")
     return name if len(name) <= MAX_NAME_LENGTH and not name[:1].isdigit() else FALLBACK_NAME
@@ -29,7 +32,8 @@ def formula_name(expr: Expr) -> str:
 def format_formula(expr: Expr) -> str:
     """Return an expression as infix text with few parentheses: `m * g * r_w`.
 
-    Variable names lose their group; reals have six significant digits. For comments only.
+    Variable names lose their group and the prefix `at_`, and their dots become `_`; reals have six
+    significant digits; a choice is `if a then b else c`, an element `x[i]`. For comments only.
     """
     match expr:
         case Value(value):

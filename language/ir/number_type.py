@@ -30,7 +30,7 @@ MAX_DECIMALS = 9
 def round_to_type(value: Fraction | float, number_type: NumberType = "float64") -> float:
     """Return the number of a type nearest to a value, ties to even; overflow gives an infinity.
 
-    A Fraction is rounded once, from its exact value.
+    A Fraction is rounded once, from its exact value. A float stays as it is for "float64".
     """
     if isinstance(value, Fraction):
         return (
@@ -42,7 +42,10 @@ def round_to_type(value: Fraction | float, number_type: NumberType = "float64") 
 
 
 def round_to_float32(value: float) -> float:
-    """Return the float32 nearest to a double, ties to even; overflow gives an infinity."""
+    """Return the float32 nearest to a double, ties to even; overflow gives an infinity.
+
+    The result is a Python float. NaN and infinities stay as they are.
+    """
     try:
         result: float = FLOAT32_STRUCT.unpack(FLOAT32_STRUCT.pack(value))[0]
     except OverflowError:
@@ -60,8 +63,8 @@ ROUNDING_FUNCTIONS: Mapping[NumberType, Callable[[float], float]] = {
 def shortest_decimal(value: float, number_type: NumberType) -> str:
     """Return the shortest decimal text that reads back as the same number of the type (rule C4).
 
-    The text is in the notation of repr. Raises ValueError if `value` is not a float32 but should
-    be.
+    The text is in the notation of repr, also for infinities and NaN. Raises ValueError if
+    `number_type` is "float32" and `value` is finite but no float32.
     """
     if number_type == "float64" or not math.isfinite(value):
         return repr(value)

@@ -33,8 +33,10 @@ Blocks = Mapping[str, Block]
 def max_operations(blocks: Blocks, name: str) -> int:
     """Return the largest number of operations that one run of the block `name` executes.
 
-    Arithmetic, comparisons, calls, tests and stores count as one each; blocks that it runs are
-    included. The body of a called function is not.
+    Operators, comparisons, choices, array elements, calls, tests, assignments and stores count as
+    one each, a counter and each pass of a loop as two more than their parts. Blocks that it runs
+    are included, the bodies of called functions are not. Of a branch or switch the longest side
+    counts. Raises KeyError for an unknown block.
     """
     counts: dict[str, int] = {}
 
@@ -68,9 +70,10 @@ def max_operations(blocks: Blocks, name: str) -> int:
 
 
 def count_expr(value: Expr) -> int:
-    """Return the number of operations of an expression.
+    """Return the number of operators, comparisons, choices, calls and elements of an expression.
 
-    Only the longer alternative of a choice counts.
+    Literals and variables count as none. Only the longer alternative of a choice counts, and the
+    bodies of called functions do not.
     """
     match value:
         case Unary(_, operand):

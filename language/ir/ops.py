@@ -22,6 +22,7 @@ class Value:
     def round_to_type(self, number_type: NumberType) -> Value:
         """Return the literal rounded to a number type.
 
+        It is rounded from `exact` if that is given, else from `value`; the result has no `exact`.
         Whole numbers and truth values are returned unchanged.
         """
         if not isinstance(self.value, float):
@@ -176,7 +177,10 @@ Block = tuple[Op, ...]
 
 
 def real(value: float | Fraction) -> Value:
-    """Return a real literal in float64; a Fraction is stored as the exact value, too."""
+    """Return a real literal in float64, also for a whole number.
+
+    A Fraction is rounded once and also kept as `exact`.
+    """
     if isinstance(value, Fraction):
         return Value(round_to_type(value), value)
     return Value(float(value))
@@ -208,7 +212,10 @@ def divide(left: Expr, right: Expr) -> Binary:
 
 
 def sum_of(parts: list[Expr]) -> Expr:
-    """Return the sum of the parts, added from left to right; the real 0 for an empty list."""
+    """Return the sum of the parts, added from left to right; the real 0 for an empty list.
+
+    One part is returned as it is.
+    """
     if not parts:
         return real(0.0)
     result = parts[0]

@@ -41,17 +41,19 @@ An entry holds its Program, so that the identity stays unique.
 
 
 def format_program(program: Program) -> str:
-    """Return a Program as text, one operation per line.
+    """Return a Program as text, one operation, constant or variable per line.
 
-    The order is header, constants, variables, functions, blocks.
+    The order is header (name, number type, period, modes), transitions, alarms, invariants, faults,
+    constants, variables, default inputs, outputs, functions, blocks; each in the order of the
+    Program. Inner blocks are indented by INDENT.
     """
     return "\n".join(_program_lines(program)) + "\n"
 
 
 def digest(program: Program) -> str:
-    """Return the first 16 hexadecimal digits of the SHA-256 of the text of a Program.
+    """Return the first 16 hexadecimal digits of the SHA-256 of `format_program`.
 
-    The digests of the Programs used last are cached.
+    The digests of the last MAX_CACHED_DIGESTS Programs are cached by identity.
     """
     cached = _digest_cache.pop(id(program), None) or (program, _compute_digest(program))
     _digest_cache[id(program)] = cached
@@ -66,7 +68,11 @@ def _compute_digest(program: Program) -> str:
 
 
 def format_expr(expr: Expr) -> str:
-    """Return an expression as text with every operation in parentheses."""
+    """Return an expression as text with every operation in parentheses: `(a + (- b))`.
+
+    Variables have their full names, literals the text of repr; a choice is `(if a then b else c)`,
+    a call `f(a, b)`, an element `x[i]`.
+    """
     match expr:
         case Value(value):
             return repr(value)
@@ -86,7 +92,11 @@ def format_expr(expr: Expr) -> str:
 
 
 def block_lines(block: Block, depth: int = 0) -> Iterator[str]:
-    """Yield the lines of a block, indented by `depth` levels."""
+    """Yield the lines of a block, indented by `depth` times INDENT.
+
+    Inner blocks are one level deeper. Examples: `x := (a + b) # key`, `x[i] := a`, `if c`, `else`,
+    `when x is 1`, `repeat 3 times as i`, `count t up to 9 while c`, `fault f of x`, `run block`.
+    """
     for op in block:
         yield from (INDENT * depth + line for line in _op_lines(op))
 

@@ -120,7 +120,7 @@ class TransitionInfo:
     def timer_limit(self) -> int:
         """The value at which the wait counter saturates.
 
-        It is ticks + 1, or MAX_TIMER_TICKS for a tunable wait.
+        It is `ticks` + 1, or MAX_TIMER_TICKS for a tunable wait.
         """
         return MAX_TIMER_TICKS if self.tunable_wait else self.ticks + 1
 
@@ -258,11 +258,11 @@ class Program:
 
     @property
     def inputs(self) -> tuple[Variable, ...]:
-        """The variables of the group `input`."""
+        """The variables of the group `input`, in the order of `variables`."""
         return tuple(v for v in self.variables if v.name.startswith("input."))
 
     def modes_of(self, region: str) -> tuple[ModeInfo, ...]:
-        """Return the modes of a region; "chart" is the root.
+        """Return the modes of a region, the name of one of `regions` or "chart" for the root.
 
         Raises StopIteration for an unknown region.
         """
@@ -271,18 +271,22 @@ class Program:
         return next(info.modes for info in self.regions if info.name == region)
 
     def mode_name(self, number: int, region: str = CHART) -> str:
-        """Return the name of the mode with a number in a region."""
+        """Return the name of the mode with a number in a region.
+
+        Raises StopIteration for an unknown region or number.
+        """
         return next(mode.name for mode in self.modes_of(region) if mode.number == number)
 
     @property
     def has_log(self) -> bool:
-        """Return whether a tick may have several micro-steps, whose transitions are then logged."""
+        """Return whether there is a variable LOG_VARIABLE: a tick may have several micro-steps."""
         return any(variable.name == LOG_VARIABLE for variable in self.variables)
 
     def endpoint_names(self, info: TransitionInfo) -> tuple[str, str]:
         """Return the names of source and target of a transition.
 
-        In a chart these are paths, "" for none; else names of modes.
+        They are its `chart_endpoints` (paths, "" for none) if it has them, else the names of its
+        modes in its region.
         """
         return info.chart_endpoints or (
             self.mode_name(info.source, info.region),
@@ -290,24 +294,32 @@ class Program:
         )
 
     def mode_variables(self) -> dict[str, str]:
-        """Return the variable with the mode number of each region, keyed by region, chart first."""
+        """Return the variable with the mode number of each region, keyed by region, chart first.
+
+        The names are those of `mode_variable` with MODE_VARIABLE; the other regions have their
+        order.
+        """
         names = (CHART, *(region.name for region in self.regions))
         return {name: mode_variable(MODE_VARIABLE, name) for name in names}
 
     def fired_variables(self) -> tuple[str, ...]:
-        """Return the variables with the fired transition of each region, chart first."""
+        """Return the variables with the fired transition of each region, chart first.
+
+        Their names are those of `fired_variable`.
+        """
         return tuple(fired_variable(region) for region in self.mode_variables())
 
 
 def mode_variable(base: str, region: str) -> str:
-    """Return the variable with the mode number of a region; `base` is the variable of the chart."""
+    """Return the variable of a region: `base` for "chart", else `<base>_<region>`, dots as `_`."""
     return base if region == CHART else f"{base}_{region.replace('.', '_')}"
 
 
 def fired_variable(region: str) -> str:
     """Return the variable with the number of the transition that a region fires in a micro-step.
 
-    Its value is 0 if the region fires none.
+    It is `memory.fired` for "chart", else `memory.fired_<region>` with dots as `_`. Its value is 0
+    if the region fires none.
     """
     return mode_variable("memory.fired", region)
 
@@ -315,12 +327,12 @@ def fired_variable(region: str) -> str:
 def value_type(type_name: str) -> ValueType:
     """Return the type in a Program of a declared type.
 
-    real -> real, bool -> truth, int and enum -> whole.
+    "real" gives "real", "bool" gives "truth", any other text ("int", "enum") gives "whole".
     """
     types: dict[str, ValueType] = {"real": "real", "bool": "truth"}
     return types.get(type_name, "whole")
 
 
 def unqualified_name(name: str) -> str:
-    """Return a variable name without its group; empty if the name has no group."""
+    """Return the part of a name behind its first dot (its group); empty if the name has no dot."""
     return name.partition(".")[2]

@@ -29,7 +29,10 @@ ExprTransform = Callable[[Expr], Expr]
 
 
 def operands(expr: Expr) -> tuple[Expr, ...]:
-    """Return the direct operands of an expression from left to right; a leaf has none."""
+    """Return the direct operands of an expression from left to right; Value and Ref have none.
+
+    A choice gives condition, then, other; an array element gives its index.
+    """
     if isinstance(expr, (Binary, Compare)):
         return expr.left, expr.right
     if isinstance(expr, Call):
@@ -42,9 +45,10 @@ def operands(expr: Expr) -> tuple[Expr, ...]:
 
 
 def map_operands(expr: Expr, transform: ExprTransform) -> Expr:
-    """Return an expression with `transform` applied to its direct operands.
+    """Return an expression with `transform` applied to its direct operands, from left to right.
 
-    The same object is returned if `transform` returns every operand unchanged (by identity).
+    The same object is returned if `transform` returns every operand unchanged (by identity), and
+    for an expression without operands.
     """
     if isinstance(expr, (Binary, Compare)):
         left, right = transform(expr.left), transform(expr.right)
@@ -75,13 +79,19 @@ def map_operands(expr: Expr, transform: ExprTransform) -> Expr:
 def map_expressions(block: Block, transform: ExprTransform) -> Block:
     """Return a block with `transform` applied to each expression that an operation of it reads.
 
-    Inner blocks are included; `transform` gets whole expressions, not their parts.
+    These are the values of assignments, the indices and values of stores and the conditions of
+    branches and counters, inner blocks included, but not the selector of a switch. `transform` gets
+    whole expressions, not their parts.
     """
     return tuple(_map_op(op, transform) for op in block)
 
 
 def direct_expressions(op: Op) -> tuple[Expr, ...]:
-    """Return the expressions that an operation reads itself, without those of its inner blocks."""
+    """Return the expressions that an operation reads itself, without those of its inner blocks.
+
+    They are the value of an assignment, index and value of a store, or the condition of a branch or
+    counter; other operations have none.
+    """
     match op:
         case Assign(_, value, _):
             return (value,)
@@ -94,7 +104,10 @@ def direct_expressions(op: Op) -> tuple[Expr, ...]:
 
 
 def walk_post_order(expr: Expr) -> Iterator[Expr]:
-    """Yield all parts of an expression, operands before the expression that contains them."""
+    """Yield all parts of an expression, operands before the expression that contains them.
+
+    Operands come from left to right, and `expr` itself comes last.
+    """
     for part in operands(expr):
         yield from walk_post_order(part)
     yield expr

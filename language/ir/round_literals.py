@@ -21,7 +21,8 @@ NodeT = TypeVar("NodeT")
 def round_program(program: Program) -> Program:
     """Return a Program with its literals and constants rounded to its number type.
 
-    A Program in float64 is returned unchanged. Functions are not changed: they exist for each type.
+    Of a constant these are a real value, the array items and the range. A Program in float64 is
+    returned unchanged. The bodies of functions are not changed: they exist for each type.
     """
     number = program.number_type
     if number == "float64":
@@ -34,9 +35,9 @@ def round_program(program: Program) -> Program:
 
 
 def round_block(block: Block, number_type: NumberType) -> Block:
-    """Return a block with its literals rounded to a number type.
+    """Return a block with its real literals, inner blocks included, rounded to a number type.
 
-    For float64 the block is returned unchanged.
+    For float64 the same block is returned.
     """
     return block if number_type == "float64" else _round_node(block, number_type)
 

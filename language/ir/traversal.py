@@ -33,7 +33,8 @@ from language.ir.ops import (
 def walk_ops(block: Block) -> Iterator[Op]:
     """Yield every operation of a block in the order of the text, inner blocks included.
 
-    An operation comes before the operations of its inner blocks.
+    An operation comes before the operations of its inner blocks. Blocks of RunBlock are not
+    entered.
     """
     stack = list(reversed(block))
     while stack:
@@ -52,16 +53,17 @@ def walk_ops(block: Block) -> Iterator[Op]:
 def block_names(block: Block) -> list[str]:
     """Return the names that a block reads, then those that it writes, with repetitions.
 
-    A call counts as the name `call <function>`.
+    They are those of `block_reads` (a call counts as the name `call <function>`) and
+    `block_writes`.
     """
     return block_reads(block) + block_writes(block)
 
 
 def block_reads(block: Block) -> list[str]:
-    """Return the variables and constants that a block reads, with repetitions.
+    """Return the variables and constants that a block reads, in the order of the text, repeated.
 
-    A call counts as the name `call <function>`. Inner blocks are included, blocks of RunBlock are
-    not. A counter is not among the reads of its own operation.
+    A call counts as the name `call <function>`. Inner blocks and selectors of switches are
+    included, blocks of RunBlock are not. A counter is not among the reads of its own operation.
     """
     names: list[str] = []
     for op in walk_ops(block):
@@ -78,9 +80,10 @@ def block_reads(block: Block) -> list[str]:
 
 
 def block_writes(block: Block) -> list[str]:
-    """Return the variables that a block writes, with repetitions.
+    """Return the variables that a block writes, in the order of the text, with repetitions.
 
-    Inner blocks are included, blocks of RunBlock are not. A fault bit writes `memory.faults`.
+    They are targets, arrays, counters and the indices of loops; a fault bit writes `memory.faults`.
+    Inner blocks are included, blocks of RunBlock are not.
     """
     names: list[str] = []
     for op in walk_ops(block):
@@ -100,7 +103,8 @@ def block_writes(block: Block) -> list[str]:
 def expr_names(expr: Expr) -> list[str]:
     """Return the variables and constants that an expression reads, and `call <function>` per call.
 
-    The names are in the order of the text, with repetitions.
+    The names are in the order of `subexpressions` (parents first), with repetitions; an array
+    element gives the name of its array.
     """
     names: list[str] = []
     for part in subexpressions(expr):
@@ -112,7 +116,10 @@ def expr_names(expr: Expr) -> list[str]:
 
 
 def subexpressions(expr: Expr) -> Sequence[Expr]:
-    """Return every part of an expression, parents first, operands from left to right."""
+    """Return every part of an expression, parents first, operands from left to right.
+
+    The expression itself is the first part.
+    """
     stack: list[Expr] = [expr]
     result: list[Expr] = []
     while stack:
@@ -132,15 +139,18 @@ def subexpressions(expr: Expr) -> Sequence[Expr]:
 
 
 def names_used(blocks: Iterable[Block]) -> set[str]:
-    """Return the set of the names that some blocks read or write.
+    """Return the set of the names that some blocks read or write, by `block_names`.
 
-    A call counts as the name `call <function>`.
+    A call counts as the name `call <function>`; blocks of RunBlock are not entered.
     """
     return {name for block in blocks for name in block_names(block)}
 
 
 def reachable_blocks(name: str, blocks: Mapping[str, Block]) -> set[str]:
-    """Return the name of a block and the names of all blocks that it runs, even indirectly."""
+    """Return the name of a block and the names of all blocks that it runs, even indirectly.
+
+    Raises KeyError for a block that is not in `blocks`.
+    """
     result, stack = set[str](), [name]
     while stack:
         block_name = stack.pop()
@@ -153,7 +163,8 @@ def reachable_blocks(name: str, blocks: Mapping[str, Block]) -> set[str]:
 def substitute_variable(block: Block, name: str, constant: int) -> Block:
     """Return a block with a literal in place of each read of a whole-number variable.
 
-    The block may hold assignments and stores only. Raises TypeError for another operation.
+    Targets and arrays keep their names. The block may hold assignments and stores only; raises
+    TypeError for another operation.
     """
     ops: list[Op] = []
     for op in block:
