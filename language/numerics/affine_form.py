@@ -24,7 +24,10 @@ class AffineForm:
 
     @property
     def is_constant(self) -> bool:
-        """Return whether the form is a known constant without any state."""
+        """Return whether the form has a known constant and no coefficients.
+
+        A coefficient of value 0 counts.
+        """
         return not self.coefficients and self.constant is not None
 
 
@@ -37,14 +40,19 @@ def jacobian(
 ) -> Matrix:
     """Return the matrix A (n, n) of the linear part of `work.rate_<state>` in `work.at_<state>`.
 
+    `rates` is a block of assignments and switches; rows and columns are in the order of `states`.
     Entry i, j has the unit unit_i/(unit_j s). Terms that are not linear, or whose coefficient is
-    not constant, are left out.
+    not constant, are left out. Raises KeyError if a rate is not assigned.
     """
     return coefficient_matrix(affine_forms(rates, states, constants), states)
 
 
 def coefficient_matrix(forms: Mapping[str, AffineForm], states: tuple[str, ...]) -> Matrix:
-    """Return the matrix A (n, n) of the coefficients of all rates; a missing coefficient is 0."""
+    """Return the matrix A (n, n) of the coefficients of all rates; a missing coefficient is 0.
+
+    Row i is that of the form `work.rate_<state i>`, in the order of `states`. Raises KeyError if a
+    form is missing.
+    """
     rows = [forms[f"work.rate_{name}"].coefficients for name in states]
     return tuple(tuple(row.get(column, 0.0) for column in states) for row in rows)
 
@@ -55,7 +63,8 @@ def affine_forms(
     """Return the affine form in the states `work.at_<state>` of each name that a block assigns.
 
     The result also has the constants and the states. Names assigned inside a Switch are NOT_AFFINE,
-    because the mode of a region is not known at check time; so are arrays.
+    because the mode of a region is not known at check time; so are constant arrays. Raises
+    AssertionError for another operation than an assignment or a switch.
     """
     forms: dict[str, AffineForm] = {}
     for name, value in constants.items():
@@ -78,8 +87,10 @@ def _targets(choice: Switch) -> list[str]:
 def to_affine_form(expr: Expr, forms: Mapping[str, AffineForm]) -> AffineForm:
     """Return the affine form of an expression; NOT_AFFINE if it is not linear in the states.
 
-    A sum with a term that is not affine keeps the coefficients of its other terms and has no
-    constant.
+    `forms` gives the forms of names; an unknown name is NOT_AFFINE. A sum with a term that is not
+    affine keeps the coefficients of its other terms and has no constant. Calls and choices are
+    constant if all that they read is, else NOT_AFFINE, even if both alternatives are linear; so are
+    relations and truth values.
     """
     match expr:
         case Ref(name):

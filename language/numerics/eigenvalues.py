@@ -53,7 +53,8 @@ def dominant_entry(a: Matrix, eigenvalue: complex) -> tuple[int, int]:
     """Return row and column of the entry of A (n, n) that contributes most to an eigenvalue.
 
     With its right eigenvector x and left eigenvector y, lambda is the sum of y_i A_ij x_j / (y' x).
-    The entry with the largest summand in size is returned. The choice does not depend on units.
+    The entry with the largest summand in size is returned, of equal ones the first by row, then
+    column; both count from 0. The choice does not depend on units.
     """
     right = _eigenvector(a, eigenvalue)
     left = _eigenvector(tuple(zip(*a, strict=True)), eigenvalue)

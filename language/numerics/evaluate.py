@@ -34,7 +34,7 @@ Scalar = float | int | bool
 
 
 def divide(a: float, b: float) -> float:
-    """Return a / b by IEEE 754: x/0 is an infinity, 0/0 is NaN; no exception is raised."""
+    """Return a / b by IEEE 754: x/0 is a signed infinity, 0/0 is NaN; no exception is raised."""
     try:
         return a / b
     except ZeroDivisionError:
@@ -44,7 +44,7 @@ def divide(a: float, b: float) -> float:
 
 
 def square_root(a: float) -> float:
-    """Return the IEEE 754 square root: NaN below zero, -0.0 for -0.0."""
+    """Return the IEEE 754 square root: NaN below zero and for NaN, -0.0 for -0.0."""
     return math.sqrt(a) if a >= 0.0 else (a if a == 0.0 else math.nan)
 
 
@@ -69,7 +69,7 @@ def sign(x: float) -> float:
 
 
 def floor(x: float) -> float:
-    """Return the largest whole number not above x.
+    """Return the largest whole number not above x, as a float.
 
     The values -0.0, infinities and NaN are returned unchanged.
     """
@@ -79,7 +79,7 @@ def floor(x: float) -> float:
 def power_of_two(k: float) -> float:
     """Return 2^k exactly for a whole-valued k from -1022 to 1023.
 
-    Any other k is returned unchanged.
+    Any k outside of that range, also NaN, is returned unchanged.
     """
     return math.ldexp(1.0, int(k)) if -1022.0 <= k <= 1023.0 else k
 
@@ -92,9 +92,9 @@ INTEGER_OF_NAN = -(2**31)
 
 
 def to_integer(x: float) -> int:
-    """Return a real, truncated, as a whole number limited to MAX_FLOAT32_INTEGER in size (rule C8).
+    """Return a real, truncated towards 0, as a whole number within +-MAX_FLOAT32_INTEGER (rule C8).
 
-    A NaN gives INTEGER_OF_NAN.
+    Larger numbers and infinities give that limit. A NaN gives INTEGER_OF_NAN.
     """
     if -MAX_FLOAT32_INTEGER <= x <= MAX_FLOAT32_INTEGER:
         return int(x)
@@ -104,7 +104,7 @@ def to_integer(x: float) -> int:
 def power_of_two_float32(k: float) -> float:
     """Return 2^k exactly for a whole-valued k from -126 to 127.
 
-    Any other k is returned unchanged.
+    Any k outside of that range, also NaN, is returned unchanged.
     """
     return math.ldexp(1.0, int(k)) if -126.0 <= k <= 127.0 else k
 
@@ -155,8 +155,9 @@ def evaluate(
 ) -> Scalar:
     """Return the value of a scalar expression, each operation rounded to the number type.
 
-    `values` gives the values of names. Raises KeyError for an unknown name and TypeError for an
-    array element. The function is slow and is meant for check time.
+    `values` gives the values of names, which are not rounded. Of a choice only the selected side is
+    evaluated. Raises KeyError for an unknown name or function and TypeError for an array element.
+    The function is slow and is meant for check time.
     """
 
     def value(part: Expr) -> Scalar:
@@ -188,7 +189,11 @@ def evaluate(
 def apply_function(
     function: str, arguments: list[Scalar], number_type: NumberType = "float64"
 ) -> Scalar:
-    """Return the value of an elementary operation or of a function that is an operation list."""
+    """Return the value of an operation in ELEMENTARY or of a function in FUNCTIONS_BY_TYPE.
+
+    The result and each operation of a function are rounded to the number type. Results of functions
+    are cached, except with an argument of 0. Raises KeyError for an unknown function.
+    """
     if function in ELEMENTARY:
         return round_if_real(ELEMENTARY_BY_TYPE[number_type][function](*arguments), number_type)
     values = tuple(arguments)
@@ -212,8 +217,5 @@ def _evaluate_function(
 
 
 def round_if_real(value: Scalar, number_type: NumberType) -> Scalar:
-    """Return a real rounded to the number type.
-
-    Whole numbers and truth values are returned unchanged.
-    """
+    """Return a float rounded to the number type; whole numbers and truth values unchanged."""
     return ROUNDING_FUNCTIONS[number_type](value) if isinstance(value, float) else value

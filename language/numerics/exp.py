@@ -63,7 +63,7 @@ EXP_FLOAT64 = ExpConstants(
 
 
 def build_exp(constants: ExpConstants = EXP_FLOAT64) -> Function:
-    """Return exp as a function of operations: e^x = 2^k e^r, k whole, |r| <= ln 2 / 2.
+    """Return the Function `exp` of `x`: e^x = 2^k e^r, k whole, |r| <= ln 2 / 2.
 
     Cody and Waite 1980, Software Manual for the Elementary Functions. ln 2 has two parts; head = x
     - k ln2_1 is exact and r = head - tail. The sum 1 + (head + (r^2 p(r) - tail)) adds the large
@@ -82,7 +82,9 @@ def emit_exp(
 ) -> Expr:
     """Append the operations of e^(bounded + rest) to a function and return the result expression.
 
-    `bounded` lies within the bounds of exp; `rest` is much smaller, None for 0.
+    `bounded` lies within the bounds of exp, which is not checked; `rest` is much smaller, None for
+    0. The result itself is not assigned; the locals are `exponent`, `head`, `tail`, `r`, `scaled`
+    and those of the series.
     """
     power = round_to_nearest(multiply(bounded, constants.per_ln_2), constants.rounding_constant)
     # The comparison is false for a NaN, so that pow2 always gets a whole number.

@@ -103,9 +103,9 @@ def reduce_angle_float32(body: FunctionBuilder) -> tuple[Ref, Ref, Ref]:
 
 
 def sin_cos_kernels_float32(body: FunctionBuilder, head: Ref, tail: Ref) -> tuple[Ref, Ref]:
-    """Append the series and return (sin, cos) of head + tail, |head| <= pi/4.
+    """Append the series and return the locals (sin, cos) of head + tail, |head| <= pi/4.
 
-    The method is that of `sin_cos_kernels`.
+    The method is that of `sin_cos_kernels`, with the float32 series in one piece each.
     """
     square = body.let("square", multiply(head, head))
     half = body.let("half", multiply(real(0.5), square))

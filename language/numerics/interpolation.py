@@ -21,9 +21,10 @@ class Interpolation:
     round_value: Callable[[float], float]
 
     def lookup(self, axis: Points, size: int, values: Points, x: float) -> float:
-        """Return the value of a one-dimensional table at x.
+        """Return the value of a one-dimensional table at x, interpolated linearly.
 
-        `axis` and `values` have `size` points; the points of the axis ascend.
+        `axis` and `values` have `size` points, at least 2; the points of the axis ascend. Outside
+        of the axis the end value is returned, for a NaN a NaN.
         """
         low, part = self._find_cell(axis, size, x)
         return self._interpolate(values[low], values[low + 1], part)
@@ -40,8 +41,9 @@ class Interpolation:
     ) -> float:
         """Return the value of a two-dimensional table at (x, y).
 
-        The interpolation is linear in y along both rows, then in x. `rows` has `count` points,
-        `columns` has `width`; `values` are stored row by row.
+        The interpolation is linear in y along both rows, then in x. `rows` has `count` ascending
+        points of x, `columns` has `width` of y; `values` are stored row by row. Outside of an axis
+        its end is taken, for a NaN the result is a NaN.
         """
         row, down = self._find_cell(rows, count, x)
         column, along = self._find_cell(columns, width, y)

@@ -61,11 +61,12 @@ LOG_FLOAT64 = LogConstants(
 
 
 def build_log(constants: LogConstants = LOG_FLOAT64) -> Function:
-    """Return log as a function of operations: log x = k ln 2 + log m, sqrt 1/2 < m <= sqrt 2.
+    """Return the Function `log` of `x`: log x = k ln 2 + log m, sqrt 1/2 < m <= sqrt 2.
 
     Method of fdlibm, e_log.c (Sun Microsystems 1993). With f = m - 1, which is exact, and s = f /
     (2 + f), log m is f - (f^2/2 - s (f^2/2 + r)), where s r is the remainder of the series of
-    log((1 + s) / (1 - s)). x is clamped to the positive normal numbers.
+    log((1 + s) / (1 - s)). x is clamped to the positive normal numbers, so 0 and negative numbers
+    give the log of the smallest one.
     """
     body = FunctionBuilder()
     k, f = emit_frexp(body, X, constants)
@@ -82,8 +83,8 @@ def build_log(constants: LogConstants = LOG_FLOAT64) -> Function:
 def emit_frexp(body: FunctionBuilder, x: Expr, constants: LogConstants) -> tuple[Ref, Ref]:
     """Append the decomposition of x and return (k, f): clamped x = 2^k (1 + f), exactly.
 
-    sqrt 1/2 < 1 + f <= sqrt 2. A number below 1 is first multiplied by a power of two; then
-    repeated comparison and scaling finds k.
+    x is clamped to the positive normal numbers, and sqrt 1/2 < 1 + f <= sqrt 2. A number below 1 is
+    first multiplied by a power of two; then repeated comparison and scaling by `steps` finds k.
     """
     smallest = real(2.0**constants.lowest_exponent)
     m = body.let("bounded", clamp(x, smallest, real(constants.largest)))

@@ -49,7 +49,7 @@ def add(a: Matrix, b: Matrix) -> Matrix:
 
 
 def subtract(a: Matrix, b: Matrix) -> Matrix:
-    """Return A - B, both (n, m). Raises ValueError if the shapes differ."""
+    """Return A - B, both (n, m), computed as A + (-1) B. Raises ValueError if the shapes differ."""
     return add(a, scale(-1.0, b))
 
 
@@ -69,7 +69,10 @@ def identity(n: int) -> Matrix:
 
 
 def symmetrise(a: Matrix) -> Matrix:
-    """Return (A + A')/2, (n, n), symmetric to the last bit because float addition commutes."""
+    """Return (A + A')/2, (n, n), symmetric to the last bit because float addition commutes.
+
+    Raises ValueError if A is not square.
+    """
     return scale(0.5, add(a, transpose(a)))
 
 
@@ -137,9 +140,10 @@ def balance_and_scale(name: str, a: Matrix, h: float) -> tuple[Matrix, tuple[int
 def balancing_exponents(a: Matrix) -> tuple[int, ...]:
     """Return the exponents e of D = diag(2^e) for which D^-1 A D has rows as large as its columns.
 
-    A (n, n), finite. Parlett and Reinsch 1969 (Numer. Math. 13, 293-304), radix 2, no permutation.
-    A state with an empty row or column cannot be balanced: it is scaled until its sum is below 1,
-    by 2^256 at most.
+    A (n, n), finite; its diagonal does not count. Parlett and Reinsch 1969 (Numer. Math. 13,
+    293-304), radix 2, no permutation, MAX_SWEEPS sweeps at most. Exponents are limited to
+    +-MAX_SCALE_EXPONENT. A state with an empty row or column cannot be balanced: it is scaled until
+    the sum of the other one is below 1.
     """
     work = [[abs(x) for x in row] for row in a]
     exponents = [0] * len(a)
@@ -163,7 +167,10 @@ def balancing_exponents(a: Matrix) -> tuple[int, ...]:
 def scale_by_powers(
     a: Matrix, row_exponents: tuple[int, ...], column_exponents: tuple[int, ...]
 ) -> Matrix:
-    """Return diag(2^rows) A diag(2^columns), (n, m); exact unless an entry over- or underflows."""
+    """Return diag(2^rows) A diag(2^columns), (n, m); exact unless an entry over- or underflows.
+
+    Overflow gives an infinity. Raises ValueError if the numbers of exponents do not match A.
+    """
     return tuple(
         tuple(ldexp_or_inf(x, r + c) for x, c in zip(row, column_exponents, strict=True))
         for row, r in zip(a, row_exponents, strict=True)

@@ -55,10 +55,12 @@ POW_FLOAT64 = PowConstants("float64", LOG_FLOAT64, EXP_FLOAT64, 12, 2.0**27 + 1.
 
 
 def build_pow(constants: PowConstants = POW_FLOAT64) -> Function:
-    """Return pow as a function of operations: x^y = e^(y log x) for x >= 0; 0^y is 0 for y > 0.
+    """Return the Function `pow` of `base` and `degree`: x^y = e^(y log x) for x > 0.
 
-    y is clamped to +-2^60. log x = k ln 2 + log m as in log.py, log m = 2 s + s^3 (2/3 + 2/5 s^2 +
-    ...) with s = (m - 1) / (m + 1). The first two terms are double words, the others are not.
+    x <= 0 gives 0 for y > 0, and else counts as the smallest normal number. y is clamped to
+    +-MAX_DEGREE and y log x to the bounds of exp. log x = k ln 2 + log m as in log.py, log m = 2 s
+    + s^3 (2/3 + 2/5 s^2 + ...) with s = (m - 1) / (m + 1). The first two terms are double words,
+    the others are not.
     """
     body = FunctionBuilder()
     double_words = _DoubleWordBuilder(body, constants.splitter)

@@ -98,7 +98,10 @@ def steady_kalman_gain(phi: Matrix, qd: Matrix, c: Matrix, r: Matrix) -> tuple[M
 
 
 def require_covariance(name: str, a: Matrix) -> Matrix:
-    """Return A. Raises ValueError unless A is finite, square, exactly symmetric, diagonal >= 0."""
+    """Return A. Raises ValueError unless A is finite, square, exactly symmetric, diagonal >= 0.
+
+    Whether A is positive semidefinite is not checked. The message begins with `name`.
+    """
     require_finite(name, a)
     if len(a[0]) != len(a):
         raise ValueError(f"{name} is {format_shape(a)}, not square")

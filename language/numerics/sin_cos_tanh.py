@@ -97,13 +97,19 @@ class FunctionBuilder:
     locals: list[str] = field(default_factory=list)
 
     def let(self, name: str, value: Expr) -> Ref:
-        """Append `work.name := value` and return a reference to the local."""
+        """Append `work.<name> := value` and return a reference to that new local variable.
+
+        Whether the name was assigned before is not checked.
+        """
         self.locals.append(name)
         self.ops.append(Assign(f"work.{name}", value))
         return Ref(f"work.{name}")
 
     def build(self, name: str, about: str, parameters: tuple[str, ...] = ("x",)) -> Function:
-        """Return the function; its result is the local `y`."""
+        """Return the function with the operations so far; its result is the local `y`.
+
+        The caller must have assigned `y`, which is not checked.
+        """
         return Function(name, tuple(self.ops), tuple(self.locals), about, parameters)
 
 
@@ -136,20 +142,26 @@ class TanhConstants:
 
 
 def round_to_nearest(x: Expr, rounding_constant: Value = ROUNDING_CONSTANT) -> Expr:
-    """Return the expression of the whole number nearest to x, ties to even.
+    """Return the expression of the whole number nearest to x, ties to even: (x + c) - c.
 
-    The rounding constant of the type is added and subtracted.
+    c is the rounding constant of the number type.
     """
     return subtract(add(x, rounding_constant), rounding_constant)
 
 
 def clamp(x: Expr, low: Expr, high: Expr) -> Expr:
-    """Return x limited to [low, high]; a NaN stays a NaN, unlike with `clip` (rule C7)."""
+    """Return the expression of x limited to [low, high]; a NaN stays a NaN.
+
+    `clip` gives `low` for a NaN (rule C7).
+    """
     return Select(Compare(">", x, high), high, Select(Compare("<", x, low), low, x))
 
 
 def horner(coefficients: tuple[float, ...], x: Expr, rest: Expr | None = None) -> Expr:
-    """Return c0 + x (c1 + x (c2 + ... + x rest)); a last coefficient of 1 needs no product."""
+    """Return the expression c0 + x (c1 + x (c2 + ... + x rest)); without `rest` the last sum is cn.
+
+    If the last coefficient is 1 and there is no `rest`, it needs no product.
+    """
     *lower, last = coefficients
     result: Expr = real(last) if rest is None else add(real(last), multiply(x, rest))
     for number in reversed(lower):
@@ -158,9 +170,10 @@ def horner(coefficients: tuple[float, ...], x: Expr, rest: Expr | None = None) -
 
 
 def horner_in_pieces(body: FunctionBuilder, coefficients: tuple[float, ...], x: Expr) -> Expr:
-    """Append a polynomial c0 + x (c1 + ...) as locals of at most four coefficients.
+    """Append a polynomial c0 + x (c1 + ...) as locals of at most four coefficients each.
 
-    The last of these locals is returned.
+    The locals are named by PIECE_NAMES, so that 12 coefficients are the most. The one with c0,
+    `series`, is assigned last and returned.
     """
     rest: Expr | None = None
     for k in reversed(range(0, len(coefficients), 4)):
@@ -194,7 +207,8 @@ def count_quarter_turns(
 ) -> tuple[Ref, Ref, Ref]:
     """Append and return the clamped x, the nearest whole number of quarter turns, the quadrant.
 
-    The quadrant is 0, 1, 2 or 3.
+    x is clamped to +-`bound` [rad]. The quadrant is 0, 1, 2 or 3. The locals are `bounded`,
+    `quarters`, `turns` and `quadrant`.
     """
     bounded = body.let("bounded", clamp(X, real(-bound), real(bound)))
     quarters = body.let(
@@ -208,10 +222,11 @@ def count_quarter_turns(
 
 
 def sin_cos_kernels(body: FunctionBuilder, head: Ref, tail: Ref) -> tuple[Ref, Ref]:
-    """Append the series and return (sin, cos) of head + tail, |head| <= pi/4; tail to first order.
+    """Append the series and return the locals (sin, cos) of head + tail, |head| <= pi/4.
 
-    The largest terms are added last (Muller 2016). crest = 1 - half, near cos, has the exact
-    rounding error 1 - crest - half and is the slope of sin with respect to tail.
+    `tail` is so small that its square is left out: it adds tail (1 - head^2/2) to sin and -head
+    tail to cos. The largest terms are added last (Muller 2016). The rounding error of the local
+    `crest`, 1 - head^2/2, is computed exactly and added to cos.
     """
     square = body.let("square", multiply(head, head))
     half = body.let("half", multiply(real(0.5), square))
@@ -230,7 +245,11 @@ def sin_cos_kernels(body: FunctionBuilder, head: Ref, tail: Ref) -> tuple[Ref, R
 
 
 def select_by_quadrant(quadrant: Expr, *values: Expr) -> Expr:
-    """Return the expression that selects one of four values by quadrant 0, 1, 2 or 3."""
+    """Return the expression that selects one of four values by quadrant 0, 1, 2 or 3.
+
+    `values` are those of the quadrants 0 to 3. The comparisons are `< 0.5`, `< 1.5` and `< 2.5`; a
+    NaN gives the last value.
+    """
     result = values[3]
     for number in (2, 1, 0):
         result = Select(Compare("<", quadrant, real(number + 0.5)), values[number], result)
@@ -241,9 +260,9 @@ TRIG_FLOAT64 = TrigConstants(reduce_angle, sin_cos_kernels, TINY_ARGUMENT, "1e5"
 
 
 def build_sin(constants: TrigConstants = TRIG_FLOAT64) -> Function:
-    """Return sin as a function of operations.
+    """Return the Function `sin` of `x` [rad]; |x| is clamped to the bound of the number type.
 
-    x is clamped. The result is x itself for tiny x, so that sin -0.0 is -0.0.
+    The result is x itself for |x| below `tiny`, so that sin -0.0 is -0.0.
     """
     body = FunctionBuilder()
     quadrant, head, tail = constants.reduce_angle(body)
@@ -254,7 +273,7 @@ def build_sin(constants: TrigConstants = TRIG_FLOAT64) -> Function:
 
 
 def build_cos(constants: TrigConstants = TRIG_FLOAT64) -> Function:
-    """Return cos as a function of operations; x is clamped."""
+    """Return the Function `cos` of `x` [rad]; |x| is clamped to the bound of the number type."""
     body = FunctionBuilder()
     quadrant, head, tail = constants.reduce_angle(body)
     sin, cos = constants.kernels(body, head, tail)
@@ -268,10 +287,11 @@ TANH_FLOAT64 = TanhConstants(LAMBERT_NUMERATOR, LAMBERT_DENOMINATOR, TANH_SATURA
 
 
 def build_tanh(constants: TanhConstants = TANH_FLOAT64) -> Function:
-    """Return tanh as a function of operations (Cody and Waite 1980).
+    """Return the Function `tanh` of `x` (Cody and Waite 1980); it calls `exp`.
 
-    Lambert's fraction below 0.625, above it 1 - 2 / (e^2x + 1). Both are computed for |x| and get
-    the sign of x; the result is x itself for tiny x, so that tanh -0.0 is -0.0.
+    Lambert's fraction below 0.625, above it 1 - 2 / (e^2x + 1). Both are computed for |x|, limited
+    to `saturation`, and get the sign of x; the result is x itself for |x| below `tiny`, so that
+    tanh -0.0 is -0.0.
     """
     body = FunctionBuilder()
     full = constants.saturation

@@ -97,10 +97,10 @@ RISE, RUN = Ref("work.rise"), Ref("work.run")
 
 
 def build_tan(constants: TrigConstants = TRIG_FLOAT64) -> Function:
-    """Return tan as a function of operations; x is clamped.
+    """Return the Function `tan` of `x` [rad]; |x| is clamped to the bound of the number type.
 
     The result is sin / cos of the reduced argument, in odd quadrants -cos / sin. It is x itself for
-    tiny x.
+    |x| below `tiny`.
     """
     body = FunctionBuilder()
     quadrant, head, tail = constants.reduce_angle(body)
@@ -114,7 +114,7 @@ def build_tan(constants: TrigConstants = TRIG_FLOAT64) -> Function:
 
 
 def build_atan2(constants: Atan2Constants = ATAN2_FLOAT64, error_text: str = "1.5") -> Function:
-    """Return atan2(rise, run) as a function of operations; the value is in (-pi, pi].
+    """Return the Function `atan2` of `rise` and `run`; its value is in (-pi, pi], 0 for (0, 0).
 
     atan t, t in [0, 1], about 0, 1/2 or 1 (Cody and Waite 1980, chapter 11); t is the smaller size
     over the larger one. atan t = atan a + atan r with r = (t - a) / (1 + t a), computed from the
@@ -162,9 +162,10 @@ def build_atan2(constants: Atan2Constants = ATAN2_FLOAT64, error_text: str = "1.
 def scale_pair(
     body: FunctionBuilder, constants: Atan2Constants, smaller: Expr, larger: Expr
 ) -> tuple[Ref, Ref]:
-    """Append and return two sizes with the quotient of `smaller` and `larger` and a finite sum.
+    """Append two sizes `low` and `high` with the quotient of `smaller` and `larger`; return both.
 
-    If both are infinite both become 1; if only `larger` is, the sizes become 0 and 1.
+    Their sum is finite: if `larger` is above `huge`, both are multiplied by `scale`. If both are
+    infinite both become 1; if only `larger` is, the sizes become 0 and 1.
     """
     least, most = body.let("least", smaller), body.let("most", larger)
     factor = body.let(
