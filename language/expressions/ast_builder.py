@@ -28,10 +28,10 @@ MAX_POWER = 8
 
 
 def build_trees(parsed: ParsedShape, span: Span) -> tuple[SyntaxTree, ...]:
-    """Return the tree of an expression, or the trees of both sides of a balance.
+    """Return the tree of an expression, or the trees of both sides (left, right) of a balance.
 
-    `span` is the span of the whole text. Raises SpecError for a number, a unit or an exponent that
-    is not valid.
+    `span` is the span of the whole text. Raises SpecError at the first number ("number"), unit
+    ("unit") or exponent above MAX_POWER in size ("power") that is not valid.
     """
     builder = _AstBuilder(parsed, span)
     return tuple(builder.build_part(part) for part in parsed.shape[1])

@@ -9,7 +9,8 @@ from language.text.diagnostic import Problems, SpecError
 def coefficient_of(left: SyntaxTree, state: str) -> SyntaxTree | SpecError | None:
     """Return the factor of der(state) on the left side of a balance; None if there is no factor.
 
-    A left side of another form, or with a further der, gives a SpecError, which is returned, not
+    `der(x)` gives None, `c * der(x)` and `der(x) * c` give c. A left side of another form, of
+    another state or with a further der gives a SpecError of kind "balance", which is returned, not
     raised.
     """
     if isinstance(left, FunctionCall) and left.function == "der":

@@ -17,8 +17,9 @@ from language.text.diagnostic import Problems, SpecError
 def evaluate_literal(tree: SyntaxTree) -> tuple[Fraction, Dimension]:
     """Return the exact value in SI and the dimension of an expression of literals.
 
-    The operations are `+ - * /` and unary minus. Raises SpecError for another part, for a division
-    by zero and for a sum of different dimensions.
+    The operations are `+ - * /` and unary minus. Raises SpecError for any other part, a name, a
+    power or a call included ("constant"), for a division by zero ("value") and for a sum of
+    dimensions that are not compatible ("dimension").
     """
     problems = Problems()
     match tree:

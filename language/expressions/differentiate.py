@@ -49,7 +49,9 @@ STRICT_RELATIONS = {"<": "<", "<=": "<", ">": ">", ">=": ">"}
 def differentiate(tree: SyntaxTree, name: str, value_at: PointValue) -> SyntaxTree:
     """Return d tree / d name, simplified; 0 if the name does not occur.
 
-    `value_at` selects the branches. Raises SpecError if there is no derivative at the point.
+    Every other name counts as constant. `value_at` gives values at the point, which select the
+    branch to be differentiated (`select_branch`). Raises SpecError of kind "derivative" where a
+    branch ends exactly at the point, and for a function without derivative that reads the name.
     """
     if all(read.path != name for read in names(tree)):
         return make_number(0, tree.span)
@@ -86,9 +88,11 @@ def differentiate(tree: SyntaxTree, name: str, value_at: PointValue) -> SyntaxTr
 
 
 def select_branch(tree: SyntaxTree, value_at: PointValue) -> SyntaxTree:
-    """Return the branch that an expression takes at the point. Raises SpecError at a corner.
+    """Return the branch that a choice, `abs`, `min`, `max` or `clip` takes at the point.
 
-    `sign` and `floor` become a number. An expression without branches raises SpecError, too.
+    `abs` gives its argument or the negation of it; `sign` and `floor` give a number. Raises
+    SpecError of kind "derivative" if two compared values are equal at the point (a corner), and for
+    an expression without branches.
     """
     match tree:
         case Conditional(condition, then, other, _):
@@ -122,9 +126,11 @@ def select_branch(tree: SyntaxTree, value_at: PointValue) -> SyntaxTree:
 
 
 def decide_condition(condition: SyntaxTree, value_at: PointValue) -> bool:
-    """Return the truth of a condition at the point.
+    """Return the truth of a condition at the point; both sides of `and` and `or` are evaluated.
 
-    Raises SpecError if both sides of an order relation in it are equal at the point.
+    Conditions without an order relation (`==`, `in(...)`, names) have the value of `value_at`.
+    Raises SpecError of kind "derivative" if both sides of an order relation in it are equal at the
+    point.
     """
     match condition:
         case BoolLiteral(value, _):
@@ -146,7 +152,7 @@ def decide_condition(condition: SyntaxTree, value_at: PointValue) -> bool:
 
 
 def derivative_error(span: Span, label: str, help: str = "") -> SpecError:
-    """Return the error of an expression that has no derivative at the point; it is not raised."""
+    """Return a SpecError with one problem of kind "derivative" at `span`; it is not raised."""
     problems = Problems()
     problems.error("derivative", span, label, help)
     return SpecError(problems.reported)

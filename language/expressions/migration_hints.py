@@ -74,16 +74,18 @@ FUNCTION_HINTS: Mapping[str, str] = {
 def key_alias_hint(word: str, known_keys: Collection[str]) -> str:
     """Return "did you mean `x`?" for a key of another tool.
 
-    The text is empty if no known key corresponds to the word.
+    x is the first of the keys in KEY_ALIASES for the word that is among `known_keys`. The text is
+    empty if there is none.
     """
     alias = next((key for key in KEY_ALIASES.get(word, ()) if key in known_keys), "")
     return f"did you mean `{alias}`?" if alias else ""
 
 
 def key_hint(key: str, what: str) -> str:
-    """Return the help text for a key that is not allowed at `what`, the key path.
+    """Return the help text for a key that is not allowed at `what`, the key path; empty if unknown.
 
-    The text is empty if no help is known.
+    Known are `on x` and `on_x` at any place, `priority` of a region at the root, and the keys of
+    KEY_HINTS below `modes.` or `regions.`.
     """
     event_key = re.fullmatch(r"on[ _](\w+)", key)
     if event_key:
@@ -99,7 +101,9 @@ def key_hint(key: str, what: str) -> str:
 def mapping_hint(node: YamlNode, what: str) -> str:
     """Return the help text for a text or list where a mapping is needed; empty if none is known.
 
-    Assignments like `k = 1` in the text are shown as a mapping.
+    If `what`, the key path, ends with `transitions` or a name below it, the text is an example of a
+    transition. Else assignments like `k = 1` in the text, or in the items of the list, are shown as
+    a mapping: "it is written `{k: 1}`".
     """
     if what.endswith("transitions"):
         return "each has a name: `transitions: {fault: {to: fault, when: ...}}`"
@@ -113,7 +117,11 @@ def mapping_hint(node: YamlNode, what: str) -> str:
 
 
 def increment_hint(text: str) -> str:
-    """Return the help text for `k++` or `k += 2`; empty for another text."""
+    """Return the help text for a text that contains `k++`, `k--`, `k += 2` or the like; else empty.
+
+    It is "write the whole new value: `k: k + 2`", or without a name before the sign a general
+    example.
+    """
     match = INCREMENT_PATTERN.search(text)
     if not match:
         return ""
@@ -124,7 +132,11 @@ def increment_hint(text: str) -> str:
 
 
 def event_guard_hint(text: str, events: Collection[str]) -> str:
-    """Return the help text for an event written as `go [a]`; empty for another text."""
+    """Return the help text for an event with its guard in brackets, `go [a]`; else empty.
+
+    The name before the brackets has to be one of `events`. The text shows the keys `event` and
+    `when`.
+    """
     match = EVENT_WITH_GUARD_PATTERN.fullmatch(text)
     if not match or match.group(1) not in events:
         return ""

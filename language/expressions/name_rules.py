@@ -25,7 +25,10 @@ DEVICE_NAME_PATTERN = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE
 
 @cache
 def reserved_words() -> Mapping[str, frozenset[str]]:
-    """Return the reserved words by section: GRAMMAR, YAML, C, C++, A2L, GENERATED."""
+    """Return the reserved words by section: GRAMMAR, YAML, C, C++, A2L, GENERATED.
+
+    They are read from the file reserved.txt once.
+    """
     text = resources.files("language.expressions").joinpath("reserved.txt").read_text("utf-8")
     sections: dict[str, frozenset[str]] = {}
     for section in text.split("\n[")[1:]:
@@ -40,9 +43,11 @@ COMMA_HINT = "in `{...}` YAML ends a value at a comma: quote a value that has on
 
 
 def check_name(name: str, span: Span, problems: Problems) -> None:
-    """Report a name of a wrong form or a reserved name.
+    """Report a name of a wrong form or a reserved name, with one problem of kind "name" at most.
 
-    The rules are in docs/language.md, "Names, numbers, units".
+    The form is that of NAME_PATTERN: a letter, then at most 30 letters, digits or `_`. Reserved are
+    the words of `reserved_words`, those of YAML in any case, and the macros of C_MACRO_PATTERN
+    (docs/language.md, "Names, numbers, units").
     """
     words = reserved_words()
     another = f"another name, like `{name}_1`"
@@ -67,7 +72,7 @@ def check_name(name: str, span: Span, problems: Problems) -> None:
 
 
 def check_region_name(name: str, span: Span, problems: Problems) -> None:
-    """Report a wrong name of a region or an instance.
+    """Report a wrong name of a region or an instance, by the rules of `check_name`.
 
     `main` is allowed, because in C the name is only a part of a longer name, or a member.
     """
@@ -76,7 +81,11 @@ def check_region_name(name: str, span: Span, problems: Problems) -> None:
 
 
 def check_file_name(name: str, span: Span, problems: Problems) -> None:
-    """Report a wrong name of an automaton, also one that cannot be the name of its files."""
+    """Report a wrong name of an automaton, also one that cannot be the name of its files.
+
+    The rules are those of `check_name`; in addition, FILE_WORDS and device names of Windows are
+    reported in any case.
+    """
     check_name(name, span, problems)
     if name.lower() in FILE_WORDS or DEVICE_NAME_PATTERN.fullmatch(name):
         label = f"an automaton is not called `{name}`: that is another file"
@@ -84,9 +93,10 @@ def check_file_name(name: str, span: Span, problems: Problems) -> None:
 
 
 def report_case_collisions(names: Iterable[tuple[str, Span]], problems: Problems) -> None:
-    """Report each name that differs from an earlier one in case only.
+    """Report each name that differs from an earlier one in case only, as "duplicate" at its span.
 
-    Many tools for A2L and CSV do not distinguish case.
+    A name is compared with the first one of its lower-case form; equal names are not reported. Many
+    tools for A2L and CSV do not distinguish case.
     """
     first: dict[str, tuple[str, Span]] = {}
     for name, span in names:

@@ -22,14 +22,21 @@ MAX_EXPONENT = 330
 
 
 def parse_number_literal(text: str, span: Span) -> NumberLiteral:
-    """Return a number without a unit. Raises SpecError."""
+    """Return the literal of a number without a unit, with its exact value.
+
+    Raises SpecError as `parse_decimal_literal`, and for a value above the largest double.
+    """
     return NumberLiteral(
         _require_in_range(parse_decimal_literal(text, span), text, span), NO_UNIT, span
     )
 
 
 def parse_quantity_literal(text: str, span: Span) -> NumberLiteral:
-    """Return a number with a unit, separated by one blank; its value is in SI. Raises SpecError."""
+    """Return the literal of a number with a unit, separated by one blank; its value is in SI.
+
+    The value is exact; the offset of `degC` is added. Raises SpecError as `parse_decimal_literal`,
+    for a text that is not a unit ("unit"), and for a value above the largest double ("number").
+    """
     digits, _, unit_text = text.partition(" ")
     value = parse_decimal_literal(digits, span.subspan(0, len(digits)))
     unit = _parse_unit(unit_text, span.subspan(len(digits) + 1, len(unit_text)))
@@ -39,10 +46,10 @@ def parse_quantity_literal(text: str, span: Span) -> NumberLiteral:
 
 
 def parse_decimal_literal(text: str, span: Span) -> Fraction:
-    """Return the exact value of a decimal literal.
+    """Return the exact value of a decimal literal without sign, like `12.5` or `1.0e-3`.
 
-    Raises SpecError for a form that YAML tools read differently (`1e3`, `010`), for another text,
-    and for an exponent above MAX_EXPONENT.
+    Raises SpecError of kind "number" for a form that YAML tools read differently (`1e3`, `010`),
+    for another text, and for an exponent above MAX_EXPONENT in size.
     """
     if PLAIN_DECIMAL_PATTERN.fullmatch(text):
         return _to_fraction(text)

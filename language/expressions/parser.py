@@ -35,15 +35,20 @@ MAX_DEPTH = 100
 
 
 def parse_expression(scalar: ScalarNode) -> SyntaxTree:
-    """Return the tree of an expression. Raises SpecError with the place inside the text."""
+    """Return the tree of an expression.
+
+    Raises SpecError, with the place inside the text, for a text that is not an expression, is
+    longer than MAX_EXPRESSION_LENGTH, has a line break or gives a tree deeper than MAX_DEPTH, and
+    for a number, unit or exponent that is not valid. Names and types are not checked.
+    """
     (tree,) = _parse(scalar, "expression")
     return tree
 
 
 def parse_balance(scalar: ScalarNode) -> tuple[SyntaxTree, SyntaxTree]:
-    """Return the trees of both sides of `left = right`.
+    """Return the trees of both sides of a balance `left = right`, which has exactly one `=`.
 
-    Raises SpecError with the place inside the text.
+    The form of the left side is not checked. Raises SpecError as `parse_expression`.
     """
     left, right = _parse(scalar, "balance")
     return left, right

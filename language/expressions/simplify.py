@@ -28,12 +28,15 @@ from language.text.diagnostic import Span
 
 
 def make_number(value: Fraction | int, span: Span) -> NumberLiteral:
-    """Return a number without a unit; the dimensions of derived expressions are not checked."""
+    """Return a number without a unit, for derived expressions, whose units nobody checks."""
     return NumberLiteral(Fraction(value), NO_UNIT, span)
 
 
 def add(a: SyntaxTree, b: SyntaxTree) -> SyntaxTree:
-    """Return a + b; without a zero, with numbers added, `a + -b` as `a - b`."""
+    """Return a + b; without a zero, with numbers added, `a + -b` as `a - b`.
+
+    Of two zeros the second one is returned.
+    """
     if is_zero(a):
         return b
     if is_zero(b):
@@ -46,7 +49,10 @@ def add(a: SyntaxTree, b: SyntaxTree) -> SyntaxTree:
 
 
 def subtract(a: SyntaxTree, b: SyntaxTree) -> SyntaxTree:
-    """Return a - b; without a zero, with numbers subtracted, 0 if both are the same expression."""
+    """Return a - b; without a zero, with numbers subtracted, 0 if both are the same expression.
+
+    `0 - b` becomes `-b`, and `a - -b` becomes `a + b`.
+    """
     if is_zero(b):
         return a
     if is_zero(a):
@@ -61,7 +67,10 @@ def subtract(a: SyntaxTree, b: SyntaxTree) -> SyntaxTree:
 
 
 def multiply(a: SyntaxTree, b: SyntaxTree) -> SyntaxTree:
-    """Return a b; 0 if a factor is 0, without a factor of 1, with a negation moved in front."""
+    """Return a * b; 0 if a factor is 0, without a factor of 1, with a negation moved in front.
+
+    Two numbers are multiplied.
+    """
     if is_zero(a) or is_zero(b):
         return make_number(0, a.span)
     if is_one(a):
@@ -78,7 +87,11 @@ def multiply(a: SyntaxTree, b: SyntaxTree) -> SyntaxTree:
 
 
 def divide(a: SyntaxTree, b: SyntaxTree) -> SyntaxTree:
-    """Return a / b; 0 if a is 0, a if b is 1, with a negation of a in front of the quotient."""
+    """Return a / b; 0 if a is 0, a if b is 1, with a negation of a in front of the quotient.
+
+    Two numbers are divided, unless the divisor is 0; a quotient by 0 stays an expression (if a is
+    not 0).
+    """
     if is_zero(a):
         return make_number(0, a.span)
     if is_one(b):
@@ -100,7 +113,10 @@ def negate(a: SyntaxTree) -> SyntaxTree:
 
 
 def raise_to_power(a: SyntaxTree, exponent: int) -> SyntaxTree:
-    """Return a^exponent; 1 for exponent 0, a for exponent 1, a number for a nonzero number."""
+    """Return a^exponent; 1 for exponent 0, a for exponent 1, a number if a is a nonzero number.
+
+    Another power of the number 0 stays an expression.
+    """
     if exponent == 0:
         return make_number(1, a.span)
     if exponent == 1:
@@ -111,19 +127,20 @@ def raise_to_power(a: SyntaxTree, exponent: int) -> SyntaxTree:
 
 
 def is_zero(tree: SyntaxTree) -> bool:
-    """Return whether a tree is the number 0."""
+    """Return whether a tree is the literal 0, with or without a unit."""
     return isinstance(tree, NumberLiteral) and tree.value == 0
 
 
 def is_one(tree: SyntaxTree) -> bool:
-    """Return whether a tree is the number 1."""
+    """Return whether a tree is a literal whose value in SI is 1, with or without a unit."""
     return isinstance(tree, NumberLiteral) and tree.value == 1
 
 
 def substitute_names(tree: SyntaxTree, replacements: Mapping[str, SyntaxTree]) -> SyntaxTree:
-    """Return the tree with names replaced by trees, simplified.
+    """Return the tree with names replaced by trees, its arithmetic simplified.
 
-    The names inside `in(...)` are kept. `sin`, `tan` and `tanh` of 0 become 0.
+    A path is replaced as a whole, and replacements are not searched for names again. Names without
+    a replacement and those inside `in(...)` are kept. `sin`, `tan` and `tanh` of 0 become 0.
     """
 
     def inside(part: SyntaxTree) -> SyntaxTree:

@@ -156,17 +156,23 @@ MEMORY_FUNCTIONS = (*DELAY_FUNCTIONS, *EDGE_FUNCTIONS, *TIME_FUNCTIONS)
 
 
 def memory_key(tree: FunctionCall) -> str:
-    """Return the key of a call of a function with memory; calls that are written alike share it."""
+    """Return the key of a call of a function with memory; calls that are written alike share it.
+
+    It is the function, a blank and the text of `structural_key` of its arguments.
+    """
     return f"{tree.function} {structural_key(tree.arguments)}"
 
 
 def names(tree: SyntaxTree) -> list[Name]:
-    """Return every name in the tree from left to right, with repetitions."""
+    """Return every name or path in the tree from left to right, with repetitions.
+
+    The names of functions do not count, arguments of `der` and `in` do.
+    """
     return [part for part in walk(tree) if isinstance(part, Name)]
 
 
 def walk(tree: SyntaxTree) -> list[SyntaxTree]:
-    """Return every part of the tree, parents first, from left to right."""
+    """Return every part of the tree, itself included, parents first, from left to right."""
     result: list[SyntaxTree] = []
     stack = [tree]
     while stack:
@@ -179,7 +185,10 @@ def walk(tree: SyntaxTree) -> list[SyntaxTree]:
 
 
 def children(tree: SyntaxTree) -> tuple[SyntaxTree, ...]:
-    """Return the direct parts of a tree; empty for a leaf."""
+    """Return the direct parts of a tree from left to right; empty for a leaf.
+
+    A choice gives condition, then, other; a power gives its base; a call gives its arguments.
+    """
     parts = CHILDREN_BY_TYPE.get(type(tree))
     return () if parts is None else parts(tree)
 
@@ -198,7 +207,10 @@ CHILDREN_BY_TYPE: Mapping[type, Callable[[Any], tuple[SyntaxTree, ...]]] = {
 
 
 def integer_literal(tree: SyntaxTree) -> int | None:
-    """Return the value of a literal like `2` or `-3`, a whole number without a unit; else None."""
+    """Return the value of a literal like `2`, `2.0` or `-3`; None for any other tree.
+
+    The number is whole and has no unit.
+    """
     match tree:
         case NumberLiteral(value, unit, _) if unit is NO_UNIT and value.denominator == 1:
             return int(value)
@@ -210,7 +222,11 @@ def integer_literal(tree: SyntaxTree) -> int | None:
 
 
 def structural_key(part: object) -> object:
-    """Return a hashable form of a tree without spans; equal for trees that are written alike."""
+    """Return a hashable form of a tree without spans; equal for trees that are written alike.
+
+    It is a tuple of the class name and the forms of the fields. A tuple of trees gives the tuple of
+    their forms, any other value itself. Literals of equal value in different units differ.
+    """
     if isinstance(part, tuple):
         return tuple(structural_key(item) for item in part)
     if dataclasses.is_dataclass(part):
@@ -220,7 +236,10 @@ def structural_key(part: object) -> object:
 
 
 def is_same_expression(first: SyntaxTree, second: SyntaxTree) -> bool:
-    """Return whether two trees are equal except for their spans."""
+    """Return whether two trees are equal except for their spans.
+
+    Literals are equal if value and text of the unit are; `a + b` and `b + a` differ.
+    """
     stack = [(first, second)]
     while stack:
         a, b = stack.pop()
@@ -234,7 +253,12 @@ def is_same_expression(first: SyntaxTree, second: SyntaxTree) -> bool:
 
 
 def node_label(tree: SyntaxTree) -> object:
-    """Return the content of the root of a tree without its parts: operator, name, value, ..."""
+    """Return the content of the root of a tree without its parts.
+
+    It is the path of a name, the value of a truth value, (numerator, denominator, text of the unit)
+    of a number, the operator of a binary operation, the exponent of a power, the function of a
+    call; else None.
+    """
     match tree:
         case NumberLiteral(value, unit, _):
             return (value.numerator, value.denominator, unit.text)
@@ -264,7 +288,7 @@ class TreeNumbering:
         self.numbered_trees: dict[int, tuple[SyntaxTree, int]] = {}
 
     def number_of(self, tree: SyntaxTree) -> int:
-        """Return the number of a tree; a new tree gets the next number."""
+        """Return the number of a tree; a new tree gets the next number, from 0, after its parts."""
         found = self.numbered_trees.get(id(tree))
         if found is None:
             key = (type(tree), node_label(tree), *map(self.number_of, children(tree)))
@@ -274,7 +298,10 @@ class TreeNumbering:
 
 
 def depth(tree: SyntaxTree) -> int:
-    """Return the number of nodes on the longest path from the root of a tree to a leaf."""
+    """Return the number of nodes on the longest path from the root of a tree to a leaf.
+
+    A leaf alone has depth 1.
+    """
     level, deepest = [tree], 0
     while level:
         deepest += 1

@@ -24,8 +24,9 @@ ATOM_PATTERN = re.compile(r"\$?[A-Za-z]\w*|\d+(\.\d+)?")
 def substitute_reads(text: str, replacements: Mapping[str, str]) -> tuple[str, frozenset[str]]:
     """Return an expression with names replaced where they are read, and the replaced names.
 
-    Not replaced are functions, parts of a path or of a unit, and the argument of `der(...)` and
-    `in(...)`. A replacement that is not a single name or number gets parentheses.
+    A path counts as one name. Not replaced are functions, units, and the argument of `der(...)` and
+    `in(...)`. A replacement that is not a single name or unsigned number gets parentheses; it is
+    not searched for names again. The rest of the text is kept, blanks included.
     """
     tokens = list(_tokenise(text))
     return _replace_tokens(tokens, replacements, lambda position: _is_read(tokens, position))
@@ -34,7 +35,8 @@ def substitute_reads(text: str, replacements: Mapping[str, str]) -> tuple[str, f
 def rename_names(text: str, replacements: Mapping[str, str]) -> str:
     """Return an expression with names replaced, also in `der(x)` and `in(x)`.
 
-    Functions are kept.
+    A path counts as one name. Functions and units are kept. A replacement that is not a single name
+    or unsigned number gets parentheses.
     """
     tokens = list(_tokenise(text))
     return _replace_tokens(
@@ -65,7 +67,8 @@ def _replace_tokens(
 def names_in_text(text: str) -> list[str]:
     """Return the names that an expression reads, from left to right, with repetitions.
 
-    A path is returned as it is written, blanks included.
+    Functions, keywords, units and the argument of `der(...)` and `in(...)` do not count. A path is
+    one name, as it is written, blanks included.
     """
     tokens = list(_tokenise(text))
     return [
@@ -76,15 +79,19 @@ def names_in_text(text: str) -> list[str]:
 
 
 def split_balance(balance: str) -> tuple[str, str]:
-    """Return the left and the right side of a balance; the right side is empty without a `=`."""
+    """Return the left and the right side of a balance: the stripped texts around its first `=`.
+
+    Without a `=` the right side is empty.
+    """
     left, _, right = balance.partition("=")
     return left.strip(), right.strip()
 
 
 def split_summands(text: str) -> list[tuple[str, str]]:
-    """Return the top-level summands of an expression, each with its sign `+` or `-`.
+    """Return the top-level summands of an expression as (sign, text), the sign `+` or `-`.
 
-    An expression that begins with `if` is one summand.
+    A sign before the first operand, or after another operator, stays in the text. An expression
+    that begins with `if` is one summand. An empty text gives one empty summand.
     """
     result: list[tuple[str, str]] = []
     sign, part, depth, operand = "+", "", 0, False
@@ -103,7 +110,10 @@ def split_summands(text: str) -> list[tuple[str, str]]:
 
 
 def join_summands(parts: list[tuple[str, str]]) -> str:
-    """Return summands with their signs as one expression; `0` for an empty list."""
+    """Return summands (sign, text) as one expression, like `a - b`; `0` for an empty list.
+
+    The sign `+` of the first one is left out. Texts get no parentheses.
+    """
     text = ""
     for sign, part in parts:
         if text:

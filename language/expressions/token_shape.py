@@ -52,7 +52,11 @@ class ParsedShape:
 
 
 def parse_shape(text: str, start_rule: str) -> ParsedShape:
-    """Return the shape of a text for a start rule of the grammar. Raises lark's UnexpectedInput."""
+    """Return the shape of a text for a start rule, "expression" or "balance", with its tokens.
+
+    Shapes are cached by the kinds of the tokens. Raises lark's UnexpectedInput if the text does not
+    match the rule.
+    """
     kinds: list[str] = []
     texts: list[str] = []
     starts: list[int] = []

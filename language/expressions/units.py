@@ -53,21 +53,32 @@ class Dimension:
 
     @property
     def is_number(self) -> bool:
-        """Return whether this is a pure number: without dimension and without angle."""
+        """Return whether this is a pure number: all exponents and the power of the angle are 0.
+
+        A free power of the angle (None) is not 0.
+        """
         return not any(self.powers) and self.angle == 0
 
     @property
     def is_dimensionless(self) -> bool:
-        """Return whether the exponents of all base units are 0; the angle does not count."""
+        """Return whether the exponents of all base units are 0; the angle does not count.
+
+        An unknown dimension counts as dimensionless.
+        """
         return not any(self.powers)
 
     @property
     def display_name(self) -> str:
-        """The dimension for messages, by its common name if it has one."""
+        """The dimension for messages: its name in COMMON_NAMES, else its text in SI symbols."""
         return DISPLAY_NAMES.get(str(self), str(self))
 
     def __str__(self) -> str:
-        """Return the dimension in SI symbols: `N*m`, `kg*m^2`, `rad/s`, `1`; `?` if unknown."""
+        """Return the dimension in SI symbols: `N*m`, `kg*m^2`, `rad/s`, `1`; `?` if unknown.
+
+        Dimensions of MECHANICAL_NAMES have that name, with `*rad`, `/rad` or `*rad^n` behind it.
+        Others are products of `rad` and the base units, negative powers behind `/`. A free power of
+        the angle is not shown.
+        """
         if not self.powers:
             return "?"
         known = MECHANICAL_NAMES.get(self.powers[:3])
@@ -112,13 +123,18 @@ DISPLAY_NAMES = {str(Dimension(powers)): text for powers, text in COMMON_NAMES.i
 
 
 def display_unit(text: str) -> str:
-    """Return the common name of a unit of a Program for messages, or its text if it has none."""
+    """Return the name in COMMON_NAMES of a unit given in SI symbols, or the text if it has none."""
     return DISPLAY_NAMES.get(text, text)
 
 
 @cache
 def parse_unit(text: str) -> Unit:
-    """Return the unit of a text like `N*m*s/rad`, `1/s`, `kg*m^2`, `degC`. Raises UnitError."""
+    """Return the unit of a text like `N*m*s/rad`, `1/s`, `kg*m^2`, `degC`.
+
+    `1/` inverts the first symbol only, and `/` the next one. `1` gives NO_UNIT; only `degC` alone
+    has an offset. Raises UnitError for a text of another form and for a symbol that is not in
+    SYMBOLS. Cached.
+    """
     if text == "1":
         return NO_UNIT
     if not re.fullmatch(UNIT_PATTERN, text):
@@ -142,9 +158,9 @@ def parse_unit(text: str) -> Unit:
 def dimension_product(a: Dimension, b: Dimension, sign: int = 1) -> Dimension:
     """Return the dimension of a * b (sign 1) or a / b (sign -1), with the angle power of rule 20.
 
-    A factor that is a pure number keeps the angle power of the other. The power is free (None) for
-    two quantities with dimensions, and for one with a dimension and an angle. Powers of angles
-    alone add exactly.
+    A factor that is a pure number keeps the angle power of the other (negated for a divisor).
+    Powers of angles alone add exactly. The power is free (None) for all other products. An unknown
+    factor gives UNKNOWN_DIMENSION.
     """
     if UNKNOWN_DIMENSION in (a, b):
         return UNKNOWN_DIMENSION
@@ -159,9 +175,9 @@ def dimension_product(a: Dimension, b: Dimension, sign: int = 1) -> Dimension:
 
 
 def rate_dimension(a: Dimension) -> Dimension:
-    """Return the dimension of the time derivative of a quantity.
+    """Return the dimension of the time derivative of a quantity: one power of the second less.
 
-    The power of the angle stays the same.
+    The power of the angle stays the same; UNKNOWN_DIMENSION stays unknown.
     """
     if a == UNKNOWN_DIMENSION:
         return UNKNOWN_DIMENSION
@@ -171,7 +187,7 @@ def rate_dimension(a: Dimension) -> Dimension:
 def dimension_power(a: Dimension, exponent: int) -> Dimension:
     """Return the dimension of a^exponent; the angle power is free unless a is a pure angle.
 
-    Exponent 0 gives a pure number, exponent 1 gives a unchanged.
+    Exponent 0 gives a pure number; exponent 1, and a pure number as base, give a unchanged.
     """
     if a.is_number or exponent == 1:
         return a
@@ -183,7 +199,10 @@ def dimension_power(a: Dimension, exponent: int) -> Dimension:
 
 
 def dimension_sqrt(a: Dimension) -> Dimension | None:
-    """Return the dimension of sqrt(a), or None if a power is odd."""
+    """Return the dimension of sqrt(a), or None if an exponent or the angle power is odd.
+
+    A free angle power stays free; UNKNOWN_DIMENSION stays unknown.
+    """
     if a == UNKNOWN_DIMENSION:
         return UNKNOWN_DIMENSION
     odd_angle = a.angle is not None and a.angle % 2 != 0
@@ -193,16 +212,20 @@ def dimension_sqrt(a: Dimension) -> Dimension | None:
 
 
 def are_compatible(a: Dimension, b: Dimension) -> bool:
-    """Return whether two quantities may be added, compared or assigned (rule 20)."""
+    """Return whether two quantities may be added, compared or assigned (rule 20).
+
+    The exponents have to be equal, and the angle powers too unless one is free. UNKNOWN_DIMENSION
+    is compatible with every dimension.
+    """
     if UNKNOWN_DIMENSION in (a, b):
         return True
     return a.powers == b.powers and (a.angle is None or b.angle is None or a.angle == b.angle)
 
 
 def common_dimension(a: Dimension, b: Dimension) -> Dimension:
-    """Return the dimension of a sum of two compatible quantities.
+    """Return the dimension of a sum of two compatible quantities; compatibility is not checked.
 
-    A known angle power has precedence.
+    It is a, or b if the angle power of a is free; UNKNOWN_DIMENSION if one is unknown.
     """
     if UNKNOWN_DIMENSION in (a, b):
         return UNKNOWN_DIMENSION
@@ -210,7 +233,12 @@ def common_dimension(a: Dimension, b: Dimension) -> Dimension:
 
 
 def unit_hint(text: str) -> str:
-    """Return "did you mean `N*m`?" for a text that is not a unit; empty without a suggestion."""
+    """Return "did you mean `N*m`?" for a text that is not a unit; empty without a suggestion.
+
+    A text in MISSPELLED_UNITS gives its unit. Else each symbol is replaced by the one most similar
+    to it, and the result is suggested if it is a unit. Else a text with a blank gives examples of
+    units.
+    """
     if text in MISSPELLED_UNITS:
         return f"did you mean `{MISSPELLED_UNITS[text]}`?"
     changed = re.sub(r"[A-Za-z]+", lambda match: _nearest_symbol(match.group()), text)
@@ -221,9 +249,10 @@ def unit_hint(text: str) -> str:
 
 
 def matching_units_hint(dimension: Dimension) -> str:
-    """Return a help text with the symbols of a dimension, like `s`, `ms`, `min`.
+    """Return the help text "units that fit: `s`, `ms`, `min`" with the symbols of a dimension.
 
-    The text is empty if there are none.
+    Exponents and angle power have to be equal; symbols are in the order of SYMBOLS, without
+    products. The text is empty if there are none, and for a pure number.
     """
     matching = [
         f"`{name}`"
@@ -242,7 +271,11 @@ def _nearest_symbol(symbol: str) -> str:
 
 
 def angle_hint(left: Dimension, right: Dimension) -> str:
-    """Return the help text for two dimensions that differ in the angle only; else an empty text."""
+    """Return the help text for two dimensions with equal exponents, which differ in the angle only.
+
+    For an angle and a number it proposes to give the unit of the angle. The text is empty if the
+    exponents differ.
+    """
     if left.powers != right.powers:
         return ""
     if left.is_dimensionless and 0 in (left.angle, right.angle):
