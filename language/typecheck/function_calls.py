@@ -39,7 +39,14 @@ FUNCTION_NAMES = (*ARGUMENT_COUNTS, *MEMORY_FUNCTIONS, "lookup", "in", "der")
 
 
 def infer_function_call(checker: TypingContext, tree: FunctionCall) -> ExprType | None:
-    """Return the type of a function call; None if a problem was reported."""
+    """Return the type of a function call; None if a problem leaves it open.
+
+    `in` is a truth value, also after a problem; functions with memory and `lookup` have the types
+    of `infer_memory_call` and `infer_lookup`. `abs`, `min`, `max` and `clip` of whole numbers give
+    a whole number, of quantities their common dimension. `sqrt` halves the dimension, `atan2` gives
+    an angle, and the others a pure number, also after a problem of dimension. Reported are an
+    unknown function, a wrong number of arguments, and arguments of a wrong type or dimension.
+    """
     name, arguments = tree.function, tree.arguments
     if name == "in":
         return _infer_in(checker, tree)
@@ -74,14 +81,22 @@ def infer_function_call(checker: TypingContext, tree: FunctionCall) -> ExprType 
 
 
 def argument_count_error(tree: FunctionCall) -> str:
-    """Return a message if an elementary function has a wrong number of arguments; else empty."""
+    """Return a message if an elementary function has a wrong number of arguments; else empty.
+
+    The message is like "`sin` takes 1 argument(s), not 2". It is empty for a function that is not
+    in ARGUMENT_COUNTS.
+    """
     expected, actual = ARGUMENT_COUNTS.get(tree.function), len(tree.arguments)
     is_correct = expected is None or actual == expected
     return "" if is_correct else f"`{tree.function}` takes {expected} argument(s), not {actual}"
 
 
 def is_integer_call(arguments: Sequence[SyntaxTree], are_integers: Sequence[bool]) -> bool:
-    """Return whether an argument is a whole number and all others are or are literals like `2`."""
+    """Return whether an argument is a whole number and all others are or are literals like `2`.
+
+    `are_integers` says of each argument whether its type is a whole number. Literals alone give
+    false.
+    """
     pairs = zip(arguments, are_integers, strict=True)
     return any(are_integers) and all(
         whole or integer_literal(tree) is not None for tree, whole in pairs

@@ -61,9 +61,9 @@ class TypeChecker:
         self.problems = problems
 
     def inside_memory_function(self, *functions: str) -> TypeChecker:
-        """Return a checker for the argument of a function with memory.
+        """Return a checker for the argument of a function with memory, with the same problems.
 
-        Of the functions with memory only `functions` are allowed there.
+        Of the functions with memory that are allowed here only `functions` are allowed there.
         """
         memory = self.environment.memory_functions & {*functions}
         return TypeChecker(
@@ -73,7 +73,9 @@ class TypeChecker:
     def check_quantity(self, tree: SyntaxTree, expected: Dimension, what: str) -> None:
         """Report an expression that is not a quantity of the dimension `expected`.
 
-        `what` names the target.
+        `what` names the target in the message. A whole number counts as a pure number, and a 0
+        without a unit has any dimension. An expression whose type is None is not reported again.
+        The kinds are "type" for a truth value or an enumeration, and "dimension".
         """
         kind = as_real_type(self.infer_type(tree))
         if isinstance(kind, str | EnumType):
@@ -93,8 +95,10 @@ class TypeChecker:
     def check_assignment(self, tree: SyntaxTree, expected: ExprType, what: str) -> None:
         """Report an expression that cannot be assigned to a target of a type.
 
-        `what` names the target. A whole-number target accepts whole numbers, literals and
-        `floor(...)`.
+        `what` names the target in the message. A whole-number target accepts whole numbers,
+        literals and `floor(...)`; ranges are not compared. A truth value or an enumeration needs
+        exactly its type, a quantity the check of `check_quantity`. An expression whose type is None
+        is not reported again.
         """
         if isinstance(expected, Dimension):
             self.check_quantity(tree, expected, what)
@@ -119,7 +123,10 @@ class TypeChecker:
             self.report("type", tree.span, label, hint)
 
     def check_condition(self, tree: SyntaxTree, what: str) -> None:
-        """Report an expression that is not true or false; `what` names the place."""
+        """Report an expression that is not a truth value; `what` names the place in the message.
+
+        An expression whose type is None is not reported again.
+        """
         kind = self.infer_type(tree)
         if kind is not None and kind != "truth":
             hint = condition_hint(tree)
@@ -127,7 +134,13 @@ class TypeChecker:
             self.report("type", tree.span, label, hint)
 
     def infer_type(self, tree: SyntaxTree) -> ExprType | None:
-        """Return the type of an expression; None if a problem was reported inside it."""
+        """Return the type of an expression, and report the problems inside it.
+
+        It is a Dimension, "truth", an IntType with the possible range, or an EnumType. Relations,
+        `and`, `or` and `not` are truth values also after a problem; whole-number arithmetic that
+        may leave 32 bits is reported and has the full range. None means a name without a type, or
+        another problem.
+        """
         match tree:
             case Name():
                 return self._infer_name(tree)
@@ -162,17 +175,22 @@ class TypeChecker:
                 return None
 
     def report(self, kind: str, span: Span, label: str, help: str = "") -> None:
-        """Report a problem as an error."""
+        """Report a problem as an error in `problems`."""
         self.problems.error(kind, span, label, help)
 
     def infer_real(self, tree: SyntaxTree) -> Dimension | None:
-        """Return the dimension of a quantity; report another type and return None."""
+        """Return the dimension of an expression; report a truth value or an enumeration.
+
+        A whole number is a pure number. The result is None after a report, and if the type of the
+        expression is None.
+        """
         return self.require_real(self.infer_type(tree), tree)
 
     def require_real(self, kind: ExprType | None, tree: SyntaxTree) -> Dimension | None:
         """Return the dimension of a type used as a real; report a truth value or an enumeration.
 
-        A whole number is a pure number. None, the type of an erroneous expression, stays None.
+        A whole number is a pure number. The result is None after a report, and for None, the type
+        of an erroneous expression. `tree` gives the place.
         """
         kind = as_real_type(kind)
         if isinstance(kind, Dimension):
@@ -253,8 +271,9 @@ class TypeChecker:
     ) -> Dimension | None:
         """Return the common dimension of the operands `a` and `b`; report dimensions that differ.
 
-        A 0 without a unit takes the dimension of the other operand. None is returned after a
-        problem.
+        `left` and `right` are the dimensions of the operands. A 0 without a unit takes the
+        dimension of the other operand. `operator` is named in the message at `span`. None is
+        returned after a problem.
         """
         if is_bare_zero(a):
             return right

@@ -12,7 +12,10 @@ from language.typecheck.types import IntType
 
 
 def integer_call_range(function: str, ranges: Sequence[IntType]) -> IntType:
-    """Return the range of the value of a function whose arguments lie in the given ranges."""
+    """Return the range of the value of a function whose arguments lie in the given ranges.
+
+    The function is `abs`, `min` or `max`; any other name counts as `clip` of (value, low, high).
+    """
     first = ranges[0]
     match function:
         case "abs":
@@ -31,7 +34,9 @@ def integer_call_range(function: str, ranges: Sequence[IntType]) -> IntType:
 def lower_integer_call(function: str, parts: Sequence[Expr]) -> Expr:
     """Return the expression of `abs`, `min`, `max` or `clip` of whole numbers as selections.
 
-    The order of comparisons is that of the functions of reals (rule C7).
+    `min` and `max` take two arguments and give the first one if both are equal; any other name
+    counts as `clip` of (value, low, high), which gives `low` unless the value is above it. The
+    order of comparisons is that of the functions of reals (rule C7).
     """
     first = parts[0]
     match function:

@@ -25,18 +25,24 @@ class Interval:
 
     @property
     def contains_zero(self) -> bool:
-        """Return whether 0 is among the values."""
+        """Return whether 0 is among the values: within the bounds and not excluded."""
         return self.low <= 0.0 <= self.high and not self.excludes_zero
 
     def intersect(self, other: Interval) -> Interval:
-        """Return the intersection with another interval; it keeps the certainty of this one."""
+        """Return the intersection with another interval; it keeps the certainty of this one.
+
+        It excludes 0 if one of them does. Without common values `low` is above `high`.
+        """
         broken = self.excludes_zero or other.excludes_zero
         return Interval(
             max(self.low, other.low), min(self.high, other.high), self.is_certain, broken
         )
 
     def hull(self, other: Interval) -> Interval:
-        """Return the smallest interval that contains both; it is certain if both are."""
+        """Return the smallest interval that contains both; it is certain if both are.
+
+        It excludes 0 if neither contains 0.
+        """
         known = self.is_certain and other.is_certain
         broken = not (self.contains_zero or other.contains_zero)
         return Interval(min(self.low, other.low), max(self.high, other.high), known, broken)
@@ -59,13 +65,20 @@ def image_of_corners(
 
 
 def even_power(base: Interval, exponent: int) -> Interval:
-    """Return the interval of an even power over an interval."""
+    """Return the interval of an even power, with an exponent of at least 2, over an interval.
+
+    Its lower bound is 0 if 0 lies within the bounds, and the certainty is that of `base`. Overflow
+    gives an infinity; 0 is never excluded.
+    """
     ends = [power_or_inf(base.low, exponent), power_or_inf(base.high, exponent)]
     return Interval(0.0 if base.low <= 0.0 <= base.high else min(ends), max(ends), base.is_certain)
 
 
 def power_or_inf(value: float, exponent: int) -> float:
-    """Return a whole power of a number; an infinity of the right sign on overflow."""
+    """Return a whole power of a number; on overflow an infinity of the right sign.
+
+    Raises ZeroDivisionError for 0 and a negative exponent.
+    """
     try:
         return float(value**exponent)
     except OverflowError:
@@ -75,8 +88,10 @@ def power_or_inf(value: float, exponent: int) -> float:
 def function_image(name: str, parts: list[Interval]) -> Interval:
     """Return the interval of a function over the intervals of its arguments.
 
-    An unknown function gives UNBOUNDED. Arguments outside of the domain of `sqrt`, `log` and `pow`
-    are clamped to it.
+    It is certain if all arguments are. `sin`, `cos`, `tanh` and `sign` give [-1, 1] and `atan2`
+    [-pi, pi], always certain; `floor` starts 1 below its argument; `previous` and `delay` give
+    their first argument. Arguments outside of the domain of `sqrt`, `log` and `pow` are clamped to
+    it. Any other function, `tan` included, gives UNBOUNDED.
     """
     first, known = parts[0], all(part.is_certain for part in parts)
     match name:

@@ -23,9 +23,12 @@ ALLOWED_PLACES = {
 
 
 def infer_memory_call(checker: TypingContext, tree: FunctionCall) -> ExprType | None:
-    """Return the type of a call of a function with memory; None if a problem was reported.
+    """Return the type of a call of a function with memory; None if the call is not valid.
 
     `delay` and `previous` have the type of their first argument; the others are truth values.
+    Reported are a function that is not allowed here and a wrong number of arguments (both give
+    None), a time that is not in seconds, and problems of the arguments; inside them only `delay`
+    and `previous` are allowed.
     """
     name, arguments = tree.function, tree.arguments
     expected = 2 if name == "delay" else 1
@@ -53,7 +56,8 @@ def infer_memory_call(checker: TypingContext, tree: FunctionCall) -> ExprType | 
 def infer_lookup(checker: TypingContext, tree: FunctionCall) -> ExprType | None:
     """Return the dimension of `lookup(table, x)` or `lookup(table, x, y)`; report unfit arguments.
 
-    None is returned if there is no such table or the number of arguments is wrong.
+    None is returned if there is no such table or the number of arguments is not that of its axes.
+    An argument of another dimension than its axis is reported only.
     """
     first, *arguments = tree.arguments
     table = checker.environment.tables.get(first.path) if isinstance(first, Name) else None
@@ -72,6 +76,6 @@ def infer_lookup(checker: TypingContext, tree: FunctionCall) -> ExprType | None:
 
 
 def table_name_of(tree: FunctionCall) -> str:
-    """Return the name of the table of a `lookup`; `...` if its first argument is not a name."""
+    """Return the name of the table of a `lookup`, its first argument; `...` if that is not a name."""
     first = tree.arguments[0]
     return first.path if isinstance(first, Name) else "..."

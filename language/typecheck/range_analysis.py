@@ -61,9 +61,9 @@ class RangeAnalysis:
         numbering: TreeNumbering,
         report: DomainReport | None = None,
     ) -> None:
-        """Store the intervals of names and tables.
+        """Store the functions that give the intervals of names and of tables by name.
 
-        `numbering` identifies expressions that are equal.
+        `numbering` identifies expressions that are equal. Without `report` nothing is reported.
         """
         self.name_interval = name_interval
         self.table_interval = table_interval
@@ -76,9 +76,10 @@ class RangeAnalysis:
         self.branch_path: list[tuple[SyntaxTree, bool]] = []
 
     def analyse(self, tree: SyntaxTree) -> Interval:
-        """Return the interval of an expression.
+        """Return the interval of an expression without constraints; a condition gives UNBOUNDED.
 
-        Report arguments outside of their domain inside it.
+        Calls `report` for each divisor that may be 0 and each argument of `sqrt`, `log` or `pow`
+        that may be outside of its domain, certain or not, from the inside out.
         """
         self.without_reports.bound_cache.clear()
         before, self.branch_path = self.branch_path, []
@@ -89,7 +90,8 @@ class RangeAnalysis:
     def interval_of(self, tree: SyntaxTree, constraints: Constraints) -> Interval:
         """Return the interval of a part of an expression under constraints.
 
-        A condition gives UNBOUNDED; its operands are analysed for reports.
+        The interval from its parts is intersected with the constraint on the expression itself.
+        Relations, `and`, `or` and `not` give UNBOUNDED; their operands are analysed for reports.
         """
         if isinstance(tree, Relation | Logic | Not):
             if self.report:
@@ -235,7 +237,10 @@ class RangeAnalysis:
         return constraints
 
     def bound_of(self, side: SyntaxTree, constraints: Constraints) -> Interval:
-        """Return the interval of one side of a relation; cached, as both outcomes need it."""
+        """Return the interval of one side of a relation, as `interval_of`.
+
+        It is cached by the identity of both arguments, as both outcomes of the relation need it.
+        """
         key = id(side), id(constraints)
         if key not in self.bound_cache:
             self.bound_cache[key] = constraints, self.interval_of(side, constraints)

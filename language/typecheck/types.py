@@ -28,7 +28,7 @@ class IntType:
 
     @property
     def fits_int32(self) -> bool:
-        """Return whether the range fits 32 bits."""
+        """Return whether the range lies within -MAX_INT to MAX_INT."""
         return self.low >= -MAX_INT and self.high <= MAX_INT
 
     def hull(self, other: IntType) -> IntType:
@@ -52,7 +52,10 @@ ExprType = Dimension | BoolType | IntType | EnumType
 
 
 def int_type_of(operator: str, left: IntType, right: IntType) -> IntType:
-    """Return the range of `left operator right` for `+ - *`, from the corners of both ranges."""
+    """Return the range of `left operator right` for `+ - *`, from the corners of both ranges.
+
+    Any other operator counts as `*`. The range may be wider than 32 bits.
+    """
     if operator == "+":
         return IntType(left.low + right.low, left.high + right.high)
     if operator == "-":
@@ -62,12 +65,18 @@ def int_type_of(operator: str, left: IntType, right: IntType) -> IntType:
 
 
 def as_real_type(kind: ExprType | None) -> ExprType | None:
-    """Return a type as an operand of real arithmetic: a whole number becomes a pure number."""
+    """Return a type as an operand of real arithmetic: a whole number becomes a pure number.
+
+    Other types and None are returned unchanged.
+    """
     return PURE_NUMBER if isinstance(kind, IntType) else kind
 
 
 def describe_type(kind: ExprType) -> str:
-    """Return a type in words for messages."""
+    """Return a type in words for messages.
+
+    The texts are "true or false", "one of a, b" (an enumeration), "a whole number", "a quantity".
+    """
     if kind == "truth":
         return "true or false"
     if isinstance(kind, EnumType):
@@ -78,10 +87,10 @@ def describe_type(kind: ExprType) -> str:
 def int_operand_types(
     a: SyntaxTree, a_type: ExprType | None, b: SyntaxTree, b_type: ExprType | None
 ) -> tuple[IntType, IntType] | None:
-    """Return both operands as whole numbers; None if they are not.
+    """Return the types of both operands as whole numbers; None if they are not.
 
-    At least one is a whole number; the other one may be a literal like `2`, with a range of one
-    value.
+    At least one type is a whole number; the other operand may be a literal like `2` or `-3`, whose
+    range is its value. Two literals give None.
     """
     if isinstance(a_type, IntType) and isinstance(b_type, IntType):
         return a_type, b_type
@@ -93,7 +102,10 @@ def int_operand_types(
 
 
 def condition_hint(tree: SyntaxTree) -> str:
-    """Return the help text for an expression where a condition is needed."""
+    """Return the help text for an expression where a condition is needed.
+
+    It is "write `false`" for the literal 0, "write `true`" for 1, else "compare it: `x > 0`".
+    """
     words = {0: "write `false`", 1: "write `true`"}
     number = integer_literal(tree)
     return "compare it: `x > 0`" if number is None else words.get(number, "compare it: `x > 0`")
@@ -102,7 +114,8 @@ def condition_hint(tree: SyntaxTree) -> str:
 def comparison_hint(tree: Relation, condition: SyntaxTree) -> str:
     """Return the help text for a truth value `condition` that `tree` compares with 0 or 1.
 
-    The text is empty for another comparison.
+    It is "it is written `a`" or "it is written `not a`" for a relation `==` or `!=`. The text is
+    empty if `condition` is not a name or the other side is not the literal 0 or 1.
     """
     number = integer_literal(tree.right if condition is tree.left else tree.left)
     if not isinstance(condition, Name) or number not in (0, 1):
