@@ -17,8 +17,8 @@ Fact = TypeVar("Fact")
 def cache_on_owner(compute: Callable[[Owner], Fact]) -> Callable[[Owner], Fact]:
     """Decorate a function of one object so that it computes its result once for each object.
 
-    The result is stored in the `__dict__` of the object under the qualified name of the function.
-    Callers share the result and must not modify it.
+    The result is stored in the `__dict__` of the object under the qualified name of the function;
+    an exception is not stored. Callers share the result and must not modify it.
     """
     name = f"once {compute.__module__}.{compute.__qualname__}"
 

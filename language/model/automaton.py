@@ -197,7 +197,10 @@ class Region:
 
     @cached_property
     def max_transitions(self) -> int:
-        """The largest number of transitions that leave one mode of the region."""
+        """The largest number of transitions of one mode of the region.
+
+        Transitions without a target count too.
+        """
         return max(len(mode.transitions) for mode in self.modes.values())
 
 
@@ -254,7 +257,10 @@ class Automaton:
     statechart: Chart | None = None
 
     def output_source(self, output: str) -> str:
-        """Return the state or equation that an output reads: by default the one of its own name."""
+        """Return the name of the state or equation that an output reads.
+
+        By default it is the name of the output.
+        """
         return self.output_sources.get(output, output)
 
     @property
@@ -280,7 +286,7 @@ class Automaton:
 
     @cached_property
     def modes_by_key(self) -> Mapping[str, Mode]:
-        """All modes, superstates included, by key path."""
+        """All modes, those of all regions and the superstates, by key path."""
         return {mode.key: mode for mode in self.all_modes}
 
     @cached_property
@@ -289,11 +295,18 @@ class Automaton:
         return {region.name: region for region in reversed(self.all_regions)}
 
     def region(self, name: str) -> Region:
-        """Return the region of a name. Raises KeyError."""
+        """Return the region of a name, "chart" for the root; of equal names the first one counts.
+
+        Raises KeyError for an unknown name.
+        """
         return self._regions_by_name[name]
 
     def source_mode(self, transition: Transition) -> Mode:
-        """Return the mode, possibly a superstate, that a transition leaves."""
+        """Return the mode, possibly a superstate, that a transition leaves.
+
+        It is the mode named `source` in the region of the transition, an innermost mode before a
+        superstate. Raises KeyError for an unknown region and StopIteration without such a mode.
+        """
         innermost = self.region(transition.region).modes.get(transition.source)
         return innermost or next(
             mode
@@ -302,20 +315,23 @@ class Automaton:
         )
 
     def target_mode(self, transition: Transition) -> Mode:
-        """Return the innermost mode that a transition names as its target. Raises KeyError."""
+        """Return the innermost mode named `target` in the region of a transition.
+
+        Raises KeyError if the region has no such mode, for example for a superstate.
+        """
         return self.region(transition.region).modes[transition.target]
 
     @cached_property
     def state_variables(self) -> Mapping[str, State]:
-        """The states and discrete variables by name: the variables that assignments may write."""
+        """The states, then the discrete variables, by name: what assignments may write."""
         return {**self.states, **self.discrete}
 
     @cached_property
     def enum_literals(self) -> Mapping[str, int]:
         """The integer values of all enumeration literals by name, those of the model included.
 
-        A literal's value is its index in the declaration. A literal of this automaton overrides an
-        equal name of the model.
+        A literal's value is its index in the declaration. Of equal names that of a discrete
+        variable counts before that of an input, of a parameter and of the model.
         """
         literals = [parameter.values for parameter in self.parameters.values()]
         literals += [variable.values for variable in self.inputs.values()]

@@ -26,7 +26,10 @@ class NamedNode(Protocol):
 
 
 def find_descendant(nodes: Sequence[NamedNode], owner: int, path: str) -> int | None:
-    """Return the index of the node at a dotted path below the node `owner`, or None."""
+    """Return the index of the node at a dotted path below the node `owner`, or None.
+
+    Each part of the path is the name of a child; of equal names the first child counts.
+    """
     for part in path.split("."):
         matches = [child for child in nodes[owner].children if nodes[child].name == part]
         if not matches:
@@ -60,7 +63,11 @@ def resolve_target(chart: Chart, source: ChartNode, name: str) -> ChartNode | No
 
 
 def target_names(chart: Chart) -> list[str]:
-    """Return the names that `to` may contain: the short names of all nodes, then all paths."""
+    """Return the names that `to` may contain: the short names of all nodes, then all paths.
+
+    Regions and histories are included, the root is not. Names are in the order of the file, with
+    repetitions.
+    """
     nodes = [node for node in chart.nodes if node.index != ROOT]
     return [*(node.name for node in nodes), *(node.path for node in nodes)]
 
@@ -80,7 +87,11 @@ def mode_paths(chart: Chart) -> dict[str, ChartNode]:
 
 
 def fault_modes(chart: Chart) -> dict[str, ChartNode]:
-    """Return the nodes that `fault_mode` may name: nodes whose region is `chart`, by path."""
+    """Return the nodes that `fault_mode` may name, by path: nodes whose region is `chart`.
+
+    They are those of `mode_paths`, with its two paths of a nested node. Modes that contain others
+    and the region itself are included; modes in regions inside a mode are not.
+    """
     return {name: node for name, node in mode_paths(chart).items() if node.region == CHART}
 
 

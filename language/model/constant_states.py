@@ -14,13 +14,21 @@ from language.model.region_queries import equation_formulas
 
 @cache_on_owner
 def constant_states(mode: Mode) -> frozenset[str]:
-    """Return the states whose balance in a mode has a right side of zero."""
+    """Return the states whose balance in a mode itself has a right side of zero.
+
+    Zero is the literal 0, or an equation whose formulas, those of parallel regions included, are
+    all zero. States balanced in a parallel region are not constant.
+    """
     flow = mode.flow.values()
     return frozenset(balance.state for balance in flow if _is_zero(mode, balance.right))
 
 
 def varying_states(automaton: Automaton, mode: str) -> tuple[str, ...]:
-    """Return the states that are not constant in the mode of a name, in the order of the file."""
+    """Return the states that are not constant in the mode of a name, in the order of the file.
+
+    The mode belongs to the region `chart`; raises KeyError for another name. States without a
+    balance in the mode count as varying.
+    """
     constant = constant_states(automaton.modes[mode])
     return tuple(name for name in automaton.states if name not in constant)
 
@@ -28,7 +36,8 @@ def varying_states(automaton: Automaton, mode: str) -> tuple[str, ...]:
 def ever_varying_states(automaton: Automaton) -> tuple[str, ...]:
     """Return the states that vary in at least one mode of the region `chart`.
 
-    They are in the order of the file.
+    A state varies in a mode unless it is one of its `constant_states`. They are in the order of the
+    file.
     """
     constant = frozenset(automaton.states).intersection(
         *map(constant_states, automaton.modes.values())
@@ -44,7 +53,8 @@ def never_varying_states(automaton: Automaton) -> frozenset[str]:
 def written_states(automaton: Automaton) -> tuple[str, ...]:
     """Return the states that a simulation writes, in the order of the file.
 
-    These are the states that vary in some mode and the states that some transition resets.
+    These are the states that vary in some mode of the region `chart` and the states that some
+    transition, also of a superstate or a parallel region, resets.
     """
     reset = {
         n

@@ -32,7 +32,7 @@ class Formula:
 
     @cached_property
     def reads(self) -> tuple[str, ...]:
-        """The names that the expression reads, from left to right, with repetitions."""
+        """The names and paths in the expression, from left to right, with repetitions."""
         return tuple(name.path for name in names(self.tree))
 
     @property

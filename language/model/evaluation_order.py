@@ -22,8 +22,9 @@ from language.text.diagnostic import Problems, Span, SpecError
 def equation_order(mode: Mode) -> list[str]:
     """Return the names of the equations of a mode, each after the equations that it reads.
 
-    Ties are resolved by the order in the file. Raises SpecError if there is an algebraic loop; the
-    message names its members.
+    Equations of its parallel regions are included; one of them depends on what any of its formulas
+    reads. Ties are resolved by the order in the file. Raises SpecError of kind "loop" if there is
+    an algebraic loop; the message names its members.
     """
     formulas = equation_formulas(mode)
     edges = reversed_edges(
@@ -49,8 +50,8 @@ def report_cycle(
 ) -> None:
     """Report the first cycle among named expressions that read each other, if there is one.
 
-    `what` is the key of the expressions, such as `initial`. The problem is placed at the span of
-    the first member.
+    `what` is the key of the expressions, such as `initial`. The problem, of kind "loop", is placed
+    at the span of the first member; only one cycle is reported.
     """
     cycle = find_cycle(_reader_edges({name: [tree] for name, tree in trees.items()}))
     if cycle:
@@ -62,10 +63,10 @@ def report_cycle(
 def unreachable_modes(
     modes: Mapping[str, Mode], initial: str, ignored_keys: Set[str] = frozenset()
 ) -> list[str]:
-    """Return the modes that no sequence of transitions from `initial` enters.
+    """Return the modes of one region that no sequence of transitions from `initial` enters.
 
-    They are in the order of `modes`. `ignored_keys` are the key paths of transitions that never
-    fire.
+    They are in the order of `modes`; `initial` counts as entered. Guards and the transitions of
+    superstates are not considered. `ignored_keys` are the key paths of transitions that never fire.
     """
     edges = {
         mode.name: [t.target for t in mode.transitions if t.key not in ignored_keys]

@@ -21,6 +21,7 @@ def topological_sort(edges: Edges) -> list[str] | None:
     """Return the nodes with each node before its successors; None if the graph has a cycle.
 
     Of the nodes that may come next, the first in the order of the keys comes first (Kahn 1962).
+    Successors that are no keys are left out. A node that leads to itself is a cycle.
     """
     if len(edges) > MAX_SMALL_GRAPH:
         import networkx
@@ -48,8 +49,8 @@ def topological_sort(edges: Edges) -> list[str] | None:
 def post_order(edges: Edges) -> list[str]:
     """Return the nodes in depth-first post-order: each after its successors, except in a cycle.
 
-    The search starts from the nodes in the order of the keys. Successors that are no keys are left
-    out.
+    The search starts from the nodes in the order of the keys and follows successors in their order.
+    Successors that are no keys are left out.
     """
     if len(edges) > MAX_SMALL_GRAPH:
         import networkx
@@ -73,7 +74,8 @@ def post_order(edges: Edges) -> list[str]:
 def find_cycle(edges: Edges) -> list[str]:
     """Return the nodes of the first cycle of a depth-first search, in the order of its edges.
 
-    The last node leads to the first one. The list is empty if the graph has no cycle.
+    The last node leads to the first one. The search starts from the nodes in the order of the keys.
+    The list is empty if the graph has no cycle.
     """
     if len(edges) <= MAX_SMALL_GRAPH and topological_sort(edges) is not None:
         return []
@@ -88,7 +90,8 @@ def find_cycle(edges: Edges) -> list[str]:
 def strongly_connected_components(edges: Edges) -> list[list[str]]:
     """Return the strongly connected components, each after the components that it leads to.
 
-    The nodes of a component are in the order of the keys.
+    Each node is in one component, alone if it is in no cycle. The nodes of a component are in the
+    order of the keys.
     """
     position = {name: index for index, name in enumerate(edges)}
     if len(edges) > MAX_SMALL_GRAPH:
@@ -107,7 +110,7 @@ def strongly_connected_components(edges: Edges) -> list[list[str]]:
 def reachable(edges: Edges, start: str) -> set[str]:
     """Return the nodes that a path from `start` reaches, `start` included.
 
-    A node that is no key has no successors.
+    A node that is no key has no successors, but is reached.
     """
     nodes, pending = {start}, [start]
     while pending:
@@ -118,7 +121,11 @@ def reachable(edges: Edges, start: str) -> set[str]:
 
 
 def reversed_edges(edges: Edges) -> dict[str, list[str]]:
-    """Return the predecessors of each node; successors that are no keys are left out."""
+    """Return the predecessors of each node; successors that are no keys are left out.
+
+    Nodes and predecessors are in the order of the keys; a repeated successor gives a repeated
+    predecessor.
+    """
     predecessors: dict[str, list[str]] = {name: [] for name in edges}
     for name, successors in edges.items():
         for successor in successors:
@@ -128,7 +135,10 @@ def reversed_edges(edges: Edges) -> dict[str, list[str]]:
 
 
 def format_cycle(cycle: Sequence[str]) -> str:
-    """Return a cycle as text: its nodes in backticks, joined by arrows, back to the first one."""
+    """Return a cycle as text, back to its first node: "`a` -> `b` -> `a`".
+
+    Raises IndexError for an empty cycle.
+    """
     return " -> ".join(f"`{name}`" for name in [*cycle, cycle[0]])
 
 

@@ -15,8 +15,9 @@ from language.text.diagnostic import Span
 def names_read_by(automaton: Automaton, include_waits: bool = True) -> Iterator[str]:
     """Yield the names in all expressions of an automaton, in no defined order and with repetitions.
 
-    The expressions of its model are left out. Expressions of `wait` are left out unless
-    `include_waits` is set.
+    Conditions, balances (both sides), assignments, start values and derived parameters are
+    included, those of the automaton's `model` are not. Expressions of `wait` are left out if
+    `include_waits` is false.
     """
     stack: list[Any] = [
         getattr(automaton, field.name)

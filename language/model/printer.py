@@ -31,10 +31,10 @@ SKIPPED_FIELDS = ("name", "key", "span")
 
 
 def format_model(automaton: Automaton) -> str:
-    """Return a checked automaton as text, one field a line, indented by depth.
+    """Return a checked automaton as text, one field a line, indented by two blanks a level.
 
-    Values are in SI and each operation is in parentheses. Fields with default values, keys and
-    places are left out.
+    Values are in SI and each operation is in parentheses. Fields with default values, empty
+    collections, names, keys and places are left out.
     """
     return "\n".join([f"automaton {automaton.name}", *_field_lines(automaton, 1)]) + "\n"
 
@@ -42,7 +42,9 @@ def format_model(automaton: Automaton) -> str:
 def format_tree(tree: SyntaxTree) -> str:
     """Return an expression as text with each operation in parentheses and literals in SI.
 
-    A tree of an unknown class gives `?`.
+    A literal has its unit in SI symbols behind it unless it is a pure number; a whole value is
+    exact, another one is the repr of its double. A tree of an unknown class, an ErrorNode included,
+    gives `?`.
     """
     match tree:
         case NumberLiteral(value, unit, _):

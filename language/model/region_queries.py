@@ -16,9 +16,9 @@ from language.model.declaration import Formula
 
 
 def equation_names(mode: Mode) -> list[str]:
-    """Return the names of the equations that are defined while a mode is active.
+    """Return the names of the equations that are defined while a mode is active, each once.
 
-    These are the equations of the mode, then those of its parallel regions.
+    These are the equations of the mode, then those of any mode of its parallel regions.
     """
     return list(equation_formulas(mode))
 
@@ -28,7 +28,8 @@ def equation_formulas(mode: Mode) -> dict[str, tuple[Formula, ...]]:
     """Return the formulas of each equation that is defined while a mode is active.
 
     An equation of the mode itself has one formula; an equation of a parallel region has one formula
-    for each mode of the region that defines it.
+    for each mode of the region that defines it. Equations of the mode come first, then the regions
+    in their order.
     """
     formulas: dict[str, tuple[Formula, ...]] = {}
     formulas.update({name: (formula,) for name, formula in mode.equations.items()})
@@ -41,14 +42,17 @@ def equation_formulas(mode: Mode) -> dict[str, tuple[Formula, ...]]:
 
 @cache_on_owner
 def region_equations(region: Region) -> list[str]:
-    """Return the names of the equations that the modes of a region define, each once."""
+    """Return the names of the equations that the modes of a region define, each once.
+
+    They are in the order of the modes and of their equations.
+    """
     return list(dict.fromkeys(name for mode in region.modes.values() for name in mode.equations))
 
 
 def region_of_equation(mode: Mode, name: str) -> Region | None:
-    """Return the parallel region of a mode that defines an equation, or None for the mode itself.
+    """Return the first parallel region of a mode with an equation, or None for the mode itself.
 
-    Raises StopIteration if neither defines it.
+    The mode itself has precedence. Raises StopIteration if neither defines the equation.
     """
     if name in mode.equations:
         return None
@@ -56,9 +60,9 @@ def region_of_equation(mode: Mode, name: str) -> Region | None:
 
 
 def region_of_balance(mode: Mode, state: str) -> Region | None:
-    """Return the parallel region of a mode that balances a state, or None for the mode itself.
+    """Return the first parallel region of a mode that balances a state; None for the mode itself.
 
-    Raises StopIteration if neither has a balance of the state.
+    The mode itself has precedence. Raises StopIteration if neither has a balance of the state.
     """
     if state in mode.flow:
         return None
@@ -67,7 +71,10 @@ def region_of_balance(mode: Mode, state: str) -> Region | None:
 
 
 def possible_balances(mode: Mode) -> Iterator[Balance]:
-    """Yield the balances of a mode, then those of all modes of its parallel regions."""
+    """Yield the balances of a mode, then those of all modes of its parallel regions.
+
+    A state may occur in several of them.
+    """
     yield from mode.flow.values()
     for region in mode.parallel_regions:
         for other in region.modes.values():
@@ -86,14 +93,15 @@ def watched_transitions(mode: Mode) -> Iterator[Transition]:
 def transitions_by_priority(mode: Mode) -> list[tuple[int, Transition]]:
     """Return pairs of index and transition of a mode, in ascending order of `priority` (rule 3a).
 
-    A transition without a priority has priority 0; equal priorities are in the order of the file.
+    The index is the position in `mode.transitions`. A transition without a priority has priority 0;
+    equal priorities are in the order of the file.
     """
     pairs = list(enumerate(mode.transitions))
     return sorted(pairs, key=lambda pair: (pair[1].priority or 0, pair[0]))
 
 
 def attach_regions(modes: Mapping[str, Mode], regions: tuple[Region, ...]) -> dict[str, Mode]:
-    """Return copies of modes whose `parallel_regions` are `regions`, by name."""
+    """Return copies of modes, by the same names, whose `parallel_regions` are `regions`."""
     return {
         name: dataclasses.replace(mode, parallel_regions=regions) for name, mode in modes.items()
     }
@@ -102,7 +110,8 @@ def attach_regions(modes: Mapping[str, Mode], regions: tuple[Region, ...]) -> di
 def equation_closure(mode: Mode, names: Iterable[str]) -> set[str]:
     """Return the names of the equations of a mode on which `names` depend, directly or indirectly.
 
-    The names themselves are included if they are equations.
+    Equations of parallel regions and all their formulas count. The names themselves are included if
+    they are equations; other names are ignored.
     """
     needed: set[str] = set()
     known = equation_formulas(mode)

@@ -49,7 +49,7 @@ class ChartNode:
     priority: int = 0
 
     def contains(self, other: int) -> bool:
-        """Tell whether the node of an index is this node or a descendant."""
+        """Tell whether the node of the index `other` is this node or one of its descendants."""
         return self.index <= other <= self.last_descendant
 
 
@@ -111,15 +111,21 @@ class Chart:
         return {name: tuple(nodes) for name, nodes in result.items()}
 
     def leaves(self, region: str) -> tuple[ChartNode, ...]:
-        """Return the innermost nodes of a region in the order of the file."""
+        """Return the numbered (innermost) nodes of the region of a name, in the order of the file.
+
+        Raises KeyError for an unknown region.
+        """
         return self._leaves[region]
 
     def leaves_of(self, node: ChartNode) -> tuple[ChartNode, ...]:
-        """Return the innermost nodes of the node's region that are the node or its descendants."""
+        """Return the innermost nodes of the node's region that are the node or its descendants.
+
+        Those of regions inside the node are left out; they are in the order of the file.
+        """
         return tuple(leaf for leaf in self.leaves(node.region) if node.contains(leaf.index))
 
     def region_node(self, name: str) -> ChartNode:
-        """Return the node of the region of a name. Raises StopIteration."""
+        """Return the node of the region of a name. Raises StopIteration for an unknown name."""
         return next(region for region in self.regions if region.region == name)
 
     def ancestors(self, node: ChartNode) -> Iterator[ChartNode]:
@@ -131,22 +137,25 @@ class Chart:
     def region_ancestors(self, leaf: ChartNode) -> tuple[ChartNode, ...]:
         """Return a node and its ancestors in its own region, from the inside out.
 
-        The last node is that of the region itself.
+        The last node is that of the region itself; ancestors outside of it are left out.
         """
         return tuple(node for node in self.ancestors(leaf) if node.region == leaf.region)
 
     def child_regions(self, node: ChartNode) -> tuple[ChartNode, ...]:
-        """Return the children of a node that are regions; empty for a node that is not parallel."""
+        """Return the direct children of a node that are regions, in the order of the file.
+
+        The result is empty for a node that is not parallel.
+        """
         children = (self.nodes[child] for child in node.children)
         return tuple(child for child in children if child.is_region)
 
     def parent_region(self, region: ChartNode) -> ChartNode | None:
-        """Return the region that directly contains a region, or None for a region of the root."""
+        """Return the innermost region around a region, or None for a region of the root."""
         parent = self.nodes[region.parent]
         return None if parent.index == ROOT else self.region_node(parent.region)
 
     def is_region_inside(self, region: ChartNode, other: ChartNode) -> bool:
-        """Tell whether a region is a proper descendant of another one."""
+        """Tell whether `region` is a descendant of `other`, at any depth and not `other` itself."""
         return region.index != other.index and other.contains(region.index)
 
     def domain(self, source: ChartNode, targets: Iterable[ChartNode], internal: bool) -> int | None:
@@ -172,18 +181,22 @@ class Chart:
         return ROOT
 
     def exited_domains(self, transitions: Iterable[ChartTransition]) -> frozenset[int]:
-        """Return the set of domains of transitions; transitions without a target are left out."""
+        """Return the set of the domains (node indices) of transitions.
+
+        Transitions without a target have none and are left out.
+        """
         return frozenset(t.domain for t in transitions if t.domain is not None)
 
     def are_nested(self, left: int, right: int) -> bool:
-        """Tell whether one of two nodes contains the other or they are the same."""
+        """Tell whether one of the nodes of two indices contains the other or they are the same."""
         return self.nodes[left].contains(right) or self.nodes[right].contains(left)
 
     def entry_set(self, node: ChartNode, targets: Iterable[int]) -> list[ChartNode]:
-        """Return the nodes that an entry of `node` activates, in preorder, without any history.
+        """Return the nodes that an entry of `node` activates, `node` first, without any history.
 
-        `targets` below the node are entered instead of `initial`. A history gives its `initial`
-        nodes and what lies between them and its parent. All regions of a parallel node are entered.
+        The nodes are in preorder. The indices `targets` below the node are entered instead of
+        `initial`; others are ignored. A history gives its `initial` nodes and what lies between
+        them and its parent, without the parent. All regions of a parallel node are entered.
         """
         targets = [w for w in targets if node.contains(w) and w != node.index]
         if node.kind == "history":
@@ -203,10 +216,16 @@ class Chart:
         return result
 
     def initial_configuration(self) -> list[ChartNode]:
-        """Return the nodes that are active at the start, by region of the root."""
+        """Return the nodes that are active at the start: the entry sets of the regions of the root.
+
+        The regions are in the order of `regions`.
+        """
         regions = (node for node in self.regions if node.parent == ROOT)
         return [node for region in regions for node in self.entry_set(region, ())]
 
     def depth(self, node: ChartNode) -> int:
-        """Return the number of nodes from the root to a node: 1 for a region of the root."""
+        """Return the number of nodes from below the root to a node: 1 for a region of the root.
+
+        The root itself has 0.
+        """
         return sum(1 for _ in self.ancestors(node))

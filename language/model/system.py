@@ -28,7 +28,7 @@ class StimulusPiece:
 
     @property
     def varies(self) -> bool:
-        """Whether the value changes within the piece; True for every formula."""
+        """Whether the value changes within the piece: the slope is not 0, or there is a formula."""
         return self.slope != 0 or self.formula is not None
 
 
@@ -45,12 +45,15 @@ class Stimulus:
 
     @property
     def steps(self) -> tuple[tuple[Fraction, Fraction], ...]:
-        """The start [s] and the value there of each piece."""
+        """The pairs (start [s], value there) of the pieces.
+
+        Slopes, formulas and a `column` are not considered.
+        """
         return tuple((piece.start, piece.value) for piece in self.pieces)
 
     @property
     def varies(self) -> bool:
-        """Whether the input changes within some piece."""
+        """Whether some piece has a slope or a formula; a `column` is not considered."""
         return any(piece.varies for piece in self.pieces)
 
 
@@ -133,7 +136,11 @@ class Connection:
 
     @property
     def reads(self) -> tuple[str, ...]:
-        """The names of the signals that the connection reads, each once."""
+        """The names of the signals that the connection reads, each once.
+
+        A signal gives its name, a constant nothing, an expression its names in order of first
+        occurrence.
+        """
         if isinstance(self.source, Formula):
             return tuple(dict.fromkeys(name.path for name in names(self.source.tree)))
         return (self.source,) if isinstance(self.source, str) else ()
@@ -165,7 +172,7 @@ class System:
         """The names of the signals that can be recorded, each once.
 
         These are the inputs, the outputs of instances as `instance.output`, the sensors and the
-        outputs of the system, in this order.
+        outputs of the system, in this order. Delayed signals are left out.
         """
         parts = [
             f"{i.name}.{name}" for i in self.instances.values() for name in i.automaton.outputs
@@ -250,7 +257,7 @@ class RecordingMap:
     databases: tuple[ScalarNode, ...] = ()
 
     def windows_of(self, file: str) -> tuple[Window, ...]:
-        """Return the windows of a file, else those for all files.
+        """Return the windows of a file, by the name used in `windows`, else those for ALL_FILES.
 
         An empty result means that the whole file is used.
         """

@@ -12,7 +12,10 @@ from language.model.statechart import ChartNode
 
 
 def node_of(automaton: Automaton, mode: Mode) -> ChartNode | None:
-    """Return the node of a mode in the chart of its automaton, or None without a chart."""
+    """Return the node of a mode in the chart of its automaton, found by the key path of the mode.
+
+    The result is None without a chart or without such a node.
+    """
     nodes = automaton.statechart.nodes if automaton.statechart else ()
     return next((node for node in nodes if node.mode_key == mode.key), None)
 
@@ -20,11 +23,13 @@ def node_of(automaton: Automaton, mode: Mode) -> ChartNode | None:
 def preceding_transitions(
     automaton: Automaton, mode: Mode, transition: Transition
 ) -> list[Transition]:
-    """Return the transitions that take precedence over one of a mode, guards and waits aside.
+    """Return the transitions that fire before `transition`, one of a mode, if all can fire.
 
-    These are the transitions of the mode that come before it by priority and, with `order:
-    outer_first`, those of the superstates around the mode. Only transitions that are possible in
-    every micro-step in which `transition` is possible are returned.
+    These are the transitions of the mode that come before it by priority, then, with `order:
+    outer_first`, those of the superstates around the mode in its region, from the inside out and in
+    the order of the file. Only transitions that react to all events to which `transition` reacts
+    (`covers_events`) are returned; guards and waits are not considered. Raises ValueError if the
+    transition does not belong to the mode.
     """
     position = [other for _, other in transitions_by_priority(mode)].index(transition)
     result = [other for _, other in transitions_by_priority(mode)[:position]]
@@ -43,8 +48,9 @@ def inner_preceding_transitions(
 ) -> Iterator[tuple[Mode, list[Transition]]]:
     """Yield each innermost mode of a superstate with the inner transitions that win over its own.
 
-    The transitions are those of the innermost mode and of its ancestors below the superstate.
-    Yields nothing with `order: outer_first`, without a chart, and for an innermost mode.
+    The transitions are those of the innermost mode, then of its ancestors below the superstate;
+    events, guards and waits are not considered. Yields nothing with `order: outer_first`, without a
+    chart, and if `mode` is an innermost mode.
     """
     chart, node = automaton.statechart, node_of(automaton, mode)
     if chart is None or node is None or chart.order != "inner_first":
@@ -57,9 +63,10 @@ def inner_preceding_transitions(
 
 
 def covers_events(automaton: Automaton, transition: Transition, other: Transition) -> bool:
-    """Tell whether a transition reacts to all events to which another transition reacts.
+    """Tell whether `transition` reacts to all events to which `other` reacts.
 
-    A transition without `event` reacts to all. Events that can never occur are ignored.
+    A transition without `event` reacts to all, and only such a one covers another without `event`.
+    Events that can never occur (`possible_events`) are ignored.
     """
     if not transition.events or not other.events:
         return not transition.events
@@ -68,7 +75,10 @@ def covers_events(automaton: Automaton, transition: Transition, other: Transitio
 
 @cache_on_owner
 def possible_events(automaton: Automaton) -> frozenset[str]:
-    """Return the events of a chart that are inputs or that some transition raises."""
+    """Return the events of a chart that are inputs or that some transition raises.
+
+    Without a chart only the raised events are returned.
+    """
     signals = automaton.statechart.events if automaton.statechart else {}
     raised = (other.raises for mode in automaton.all_modes for other in mode.transitions)
     inputs = (name for name, signal in signals.items() if signal.is_input)
@@ -76,11 +86,11 @@ def possible_events(automaton: Automaton) -> frozenset[str]:
 
 
 def is_guard_portable(transition: Transition) -> bool:
-    """Tell whether a guard has the same meaning in a mode inside its own mode.
+    """Tell whether the guard of a transition means the same in a mode inside the transition's mode.
 
-    This is false for guards with `rising`, `falling`, `changed`, `every` and other functions with
-    memory, because their memory belongs to an activation. It is true for `after`: no mode is active
-    for longer than its superstate.
+    It does unless it calls one of MEMORY_FUNCTIONS other than `after` (`rising`, `falling`,
+    `changed`, `every`, `previous`, `delay`), because their memory belongs to an activation. For
+    `after` it does: no mode is active for longer than its superstate.
     """
     parts = walk(transition.when.tree)
     used = {part.function for part in parts if isinstance(part, FunctionCall)}

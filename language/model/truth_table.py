@@ -39,12 +39,15 @@ class TruthTable:
 
     @property
     def assigned_names(self) -> tuple[str, ...]:
-        """The discrete variables that at least one row assigns, each once."""
+        """The variables that at least one row assigns, each once, in order of first occurrence."""
         return tuple(dict.fromkeys(name for row in self.rows for name in row.assignments))
 
 
 def truth_table_formulas(tables: Iterable[TruthTable]) -> list[Formula]:
-    """Return the conditions and the assigned expressions of truth tables, table by table."""
+    """Return the conditions and then the assigned expressions of each table, table by table.
+
+    Assigned expressions are row by row; repetitions stay.
+    """
     formulas: list[Formula] = []
     for table in tables:
         formulas += table.conditions.values()
