@@ -67,7 +67,7 @@ class MappingNode:
     span: Span
 
     def get(self, key: str) -> YamlNode | None:
-        """Return the node of a key of this mapping, or None if the mapping does not have the key."""
+        """Return the node of a key, or None if this mapping itself does not have the key."""
         entry = self.entries.get(key)
         return entry.node if entry else None
 
