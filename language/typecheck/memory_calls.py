@@ -76,6 +76,6 @@ def infer_lookup(checker: TypingContext, tree: FunctionCall) -> ExprType | None:
 
 
 def table_name_of(tree: FunctionCall) -> str:
-    """Return the name of the table of a `lookup`, its first argument; `...` if that is not a name."""
+    """Return the name of the table of a `lookup`; `...` if its first argument is not a name."""
     first = tree.arguments[0]
     return first.path if isinstance(first, Name) else "..."
