@@ -58,8 +58,10 @@ def generate_boundary_sequences(
 ) -> Iterator[list[bytes]]:
     """Yield input sequences that end at, or close to, a boundary of one of the given sequences.
 
-    Each boundary gives 2 * NEIGHBOUR_COUNT sequences that end at its last tick. The records are
-    those of a `TickLog`. A sequence is searched up to the first change of its calibration page; the
+    A boundary is two adjacent values of a real input between which a mode, or whether a wait has
+    begun, changes. Each boundary gives 2 * NEIGHBOUR_COUNT sequences: the given one up to the last
+    tick of the boundary, with that input set to values on both sides. The records are those of a
+    `TickLog`. A sequence is searched up to its first record that changes the calibration page; the
     search ends after MAX_TOTAL_TICKS ticks of all sequences. `ranges` gives ranges of inputs by
     name; an input without one has DEFAULT_INPUT_RANGE. Raises MissingToolError, BuildError.
     """

@@ -55,9 +55,10 @@ def generate_corpus(
 ) -> tuple[bytes, ...]:
     """Return corpus entries that together reach the coverage that libFuzzer found.
 
-    libFuzzer makes `runs` executions from each seed. A later seed starts from the entries of the
-    earlier ones, in an order that makes the result reproducible. `ranges` gives ranges of inputs by
-    name. Raises MissingToolError; BuildError also if an execution fails.
+    libFuzzer makes `runs` executions with each seed, in turn. A later seed starts from the entries
+    of the earlier ones. The result is sorted by file name, so it is reproducible. `ranges` gives
+    ranges of inputs by name; others have DEFAULT_INPUT_RANGE. Raises MissingToolError; BuildError
+    if compilation fails or a sanitizer reports a finding.
     """
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
@@ -90,10 +91,11 @@ def generate_corpus(
 def corpus_records(
     program: Program, ranges: Mapping[str, Range], corpus: Sequence[bytes]
 ) -> Iterator[list[bytes]]:
-    """Yield for each corpus entry its input records in the layout of a `TickLog`.
+    """Yield for each corpus entry the list of its input records, one per tick, as in a `TickLog`.
 
-    The records use the calibration page of the spec: the changes of the page in an entry are
-    ignored.
+    The records use the calibration page of the spec: the changes of the page at the begin of an
+    entry are skipped. The records of an entry end after `max_entry_ticks`; bytes of an incomplete
+    group of ticks are ignored.
     """
     most = max_entry_ticks(program)
     table, size = word_table(program, ranges), 1 + len(tick_inputs(program))
@@ -110,20 +112,27 @@ def corpus_records(
 
 
 def max_entry_bytes(program: Program) -> int:
-    """Return the length [bytes] of the longest corpus entry."""
+    """Return the maximum length of a corpus entry [bytes].
+
+    It is 3 * MAX_PAGE_CHANGES, plus 1 + the number of inputs for each of MAX_TICK_GROUPS groups.
+    """
     return 3 * MAX_PAGE_CHANGES + MAX_TICK_GROUPS * (1 + len(tick_inputs(program)))
 
 
 def max_entry_ticks(program: Program) -> int:
-    """Return the maximum number of ticks of a corpus entry; it is smaller for a large Program."""
+    """Return the maximum number of ticks of a corpus entry.
+
+    It is MAX_LARGE_TICKS for a Program with more than LARGE_PROGRAM operations, nested ones
+    included; else MAX_TICK_GROUPS times the longest of HOLD_TICKS.
+    """
     count = sum(1 for block in program.blocks.values() for _ in walk_ops(block))
     return MAX_LARGE_TICKS if count > LARGE_PROGRAM else MAX_TICK_GROUPS * max(HOLD_TICKS)
 
 
 def write_explorer(program: Program, ranges: Mapping[str, Range], folder: Path) -> list[Path]:
-    """Write the C of a Program and the main that executes corpus entries.
+    """Write the C of a Program, the main that executes corpus entries, and its header WORDS_HEADER.
 
-    Returns the C files to compile. Raises ValueError for a Program that has no C.
+    Returns the C files to compile. Raises ValueError for a Program without a block `step`.
     """
     sources = write_harness(
         program, folder, main=MAIN, extra_context={"page": page_scalars(program)}
@@ -147,9 +156,11 @@ def write_explorer(program: Program, ranges: Mapping[str, Range], folder: Path) 
 
 
 def page_scalars(program: Program) -> list[dict[str, Any]]:
-    """Return template contexts of the scalar numbers of the page: member, C type, low and high end.
+    """Return template contexts of the page's scalar numbers: `member`, C `type`, `low`, `high`.
 
-    Tables and truth values are left out.
+    They are the tunable and solved constants in Program order; tables and truth values are left
+    out. `low` and `high` are the declared range; without one, an enumeration has 0 to its last
+    index and any other number UNBOUNDED_RANGE.
     """
     program = restrict_to_step(program)
     c_names = CNames(program, solved_prefix=SOLVED_PREFIX_ON_PAGE)

@@ -61,7 +61,9 @@ def run_fuzzer(
 ) -> FuzzerRun:
     """Run libFuzzer on the C of a Program for `runs` executions of at most `ticks` ticks.
 
-    `ranges` gives ranges of inputs by name. Raises MissingToolError, BuildError.
+    `ranges` gives ranges of inputs by name; others have DEFAULT_INPUT_RANGE. All files are in a
+    temporary folder. Errors that a sanitizer finds are in `findings` of the result. Raises
+    MissingToolError, BuildError.
     """
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
@@ -74,7 +76,13 @@ def run_fuzzer(
 
 
 def word_table(program: Program, ranges: Mapping[str, Range]) -> list[WordValues]:
-    """Return for each input of a tick the value or difference that each byte 0 to 255 means."""
+    """Return WORDS_PER_INPUT floats for each input of a tick, in the order of `tick_inputs`.
+
+    Entry k is what the byte k means. For a real input, the first SPREAD_WORDS are spread over its
+    range (DEFAULT_INPUT_RANGE if `ranges` has none under its unqualified name), those up to
+    ABSOLUTE_WORDS are range ends and special values such as NaN, the rest are differences. For a
+    truth value and a whole number, all are values, a few of them invalid for the latter.
+    """
     return [
         _input_words(v, program, ranges.get(unqualified_name(v.name))) for v in tick_inputs(program)
     ]
@@ -83,16 +91,19 @@ def word_table(program: Program, ranges: Mapping[str, Range]) -> list[WordValues
 def decode_sequence(
     program: Program, table: list[WordValues], sequence: bytes
 ) -> Iterator[WordValues]:
-    """Yield the input values of each tick of a sequence, for at most MAX_SEQUENCE_TICKS ticks."""
+    """Yield the input values of each tick of a sequence, for at most MAX_SEQUENCE_TICKS ticks.
+
+    `sequence` has one byte for each input and tick; see `decode_inputs`.
+    """
     yield from decode_inputs(program, table, sequence[: MAX_SEQUENCE_TICKS * len(table)])
 
 
 def decode_inputs(program: Program, table: list[WordValues], data: bytes) -> Iterator[WordValues]:
-    """Yield the input values of each tick, given one byte for each input and tick.
+    """Yield a tuple of input values for each tick, given one byte for each input and tick.
 
-    A byte selects a value of the table. For a real input, a byte from ABSOLUTE_WORDS on selects a
-    difference, which is added to the last value of that input. Bytes of an incomplete tick are
-    ignored.
+    A byte is an index into the table. For a real input, a byte from ABSOLUTE_WORDS on selects a
+    difference, which is added to the last value of that input; before the first tick that is entry
+    SPREAD_WORDS // 2 of its table. Bytes of an incomplete tick are ignored.
     """
     real = [variable.type == "real" for variable in tick_inputs(program)]
     last = [own[SPREAD_WORDS // 2] for own in table]
@@ -163,7 +174,11 @@ def _format_header(table: list[WordValues]) -> str:
 
 
 def format_word_table(table: list[WordValues]) -> str:
-    """Return the C definition of the word table; each double is written in hexadecimal."""
+    """Return the C definition of the array `word`, with one row of words for each input.
+
+    It has the type `static const double [inputs][WORDS_PER_INPUT]`. Finite numbers are hexadecimal
+    literals; the others are NAN, INFINITY and -INFINITY.
+    """
     rows = ",\n".join(f"    {{{', '.join(_format_double(word) for word in own)}}}" for own in table)
     return f"static const double word[{len(table)}][{WORDS_PER_INPUT}] = {{\n{rows}\n}};\n"
 

@@ -97,7 +97,7 @@ class McdcCoverage:
 
     @property
     def uncovered(self) -> tuple[Decision, ...]:
-        """The decisions with at least one condition that is not covered."""
+        """The decisions with a condition that is not covered, also if it is proven infeasible."""
         return tuple(decision for decision in self.decisions if not all(decision.shown))
 
 
@@ -106,8 +106,10 @@ def add_infeasibility_proofs(
 ) -> McdcCoverage:
     """Return the coverage with proofs that conditions of a sampled Program are infeasible.
 
-    The proven outcomes are stored in `Decision.never`. `ranges` gives the ranges in which variables
-    stay between two steps.
+    Only conditions that are not covered are tried. The outcome that a condition never has is stored
+    in `Decision.never`. A decision is matched to sites of the Program by block and text; the
+    outcome counts only if it is proven at all of its sites. `ranges` gives by variable name the
+    ranges in which variables stay between two steps.
     """
     c_program = unshare_expressions(run_c_passes(program))
     sites = _group_by_block(decision_sites(c_program))
@@ -180,8 +182,10 @@ def measure_mcdc(
 ) -> McdcCoverage:
     """Run the instrumented C of a Program and return its MC/DC coverage.
 
-    `sequences` holds input records of a `TickLog`. `corpus` holds entries of `generate_corpus` for
-    the same `ranges` of inputs. Raises MissingToolError, BuildError.
+    `sequences` holds input records of a `TickLog`; each sequence is a run from the start. `corpus`
+    holds entries of `generate_corpus` for the same `ranges` of inputs. The decisions are those of
+    the module's C file in the order of the file, without labels of `switch`; `never` is None
+    throughout. Raises MissingToolError, BuildError.
     """
     file = f"{program.name}.c"
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
