@@ -13,9 +13,9 @@ MAX_COMMENT_LENGTH = 120
 def sanitise_comment(text: str) -> str:
     """Return a text as one line of printable ASCII that is safe between `/*` and `*/` (rule C21).
 
-    White space is collapsed, other alphabets become escapes, and the text is cut at
-    MAX_COMMENT_LENGTH. Blanks separate `*/`, `/*`, `//` and `??` (`??/` is the trigraph of a
-    backslash, C99 5.2.1.1). Backslashes at the end are removed.
+    White space is collapsed and stripped, other characters become backslash escapes, and the text
+    is cut at MAX_COMMENT_LENGTH. Afterwards a blank is put inside `*/`, `/*`, `//` and `??` (`??/`
+    is the trigraph of a backslash, C99 5.2.1.1). Backslashes and blanks at the end are removed.
     """
     line = " ".join(escape_invisible(" ".join(text.split())).split())
     ascii_line = line.encode("ascii", "backslashreplace").decode("ascii")

@@ -41,9 +41,12 @@ LEFT_ASSOCIATIVE: Mapping[str, str] = {
 
 
 def emit_expression(expr: Expr, c_names: CNameMap) -> str:
-    """Return the C text of an expression.
+    """Return the C text of an expression on one line.
 
-    Every compound operand is in parentheses, except a left operand that C evaluates first anyway.
+    Every compound operand is in parentheses, also a unary minus or negative literal; except a left
+    operand that C evaluates first anyway (LEFT_ASSOCIATIVE). A comparison of a variable with an
+    integer literal uses `integer_constant`; if exactly one of two compared variables is unsigned,
+    it is cast to int32_t.
     """
     match expr:
         case Value(value):
@@ -77,9 +80,10 @@ def emit_expression(expr: Expr, c_names: CNameMap) -> str:
 
 
 def format_literal(value: float | int | bool, number: NumberType) -> str:
-    """Return a literal: a truth value, an integer, or the shortest exact decimal (rule C4).
+    """Return a literal: `true` or `false`, an integer, or the shortest exact decimal (rule C4).
 
-    A float32 literal ends with F.
+    The type of `value` decides. The literal of a float ends with F for float32; an integer has no
+    suffix.
     """
     if isinstance(value, bool):
         return "true" if value else "false"

@@ -39,7 +39,11 @@ FLOAT_FORMATS: Mapping[NumberType, FloatFormat] = {
 
 
 def emit_math_files(number: NumberType) -> dict[str, str]:
-    """Return the header and source of ha_math by file name; of ha_mathf for float32 (rule C6)."""
+    """Return the header and source of ha_math by file name (rule C6).
+
+    The names are `ha_math.h` and `ha_math.c`, for float32 `ha_mathf.h` and `ha_mathf.c`. They hold
+    all functions of FUNCTIONS_BY_TYPE, used or not.
+    """
     suffix = MATH_SUFFIX[number]
     context = {
         "functions": [

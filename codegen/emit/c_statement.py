@@ -59,7 +59,7 @@ class StatementEmitter:
     width: int = MAX_LINE_WIDTH
 
     def emit_block(self, block: Block) -> Iterator[str]:
-        """Yield the indented lines of a block; a comment if it has no operations."""
+        """Yield the lines of a block, indented by INDENT; EMPTY_BODY if it has no operations."""
         inner = dataclasses.replace(self, width=self.width - len(INDENT))
         if not block:
             yield EMPTY_BODY
@@ -197,9 +197,8 @@ def _format_due(info: TransitionInfo) -> str:
 def split_loop_guard(index: str, body: Block) -> tuple[Expr | None, Block]:
     """Return the condition of a loop body that is one branch, and the operations inside it.
 
-    The condition must not depend on `index`. A body of any other form is returned as it is, with
-    None. If the condition is false once, it stays false, because nothing else is executed: the loop
-    may end.
+    The branch must have no else part and its condition must not read `index`: then the loop may end
+    when it is false once. A body of any other form is returned unchanged, with None.
     """
     if len(body) == 1 and isinstance(body[0], Branch) and not body[0].other:
         inner = body[0]
@@ -209,9 +208,9 @@ def split_loop_guard(index: str, body: Block) -> tuple[Expr | None, Block]:
 
 
 def is_nested(choice: Select) -> bool:
-    """Tell whether an arm of a choice is itself a choice.
+    """Tell whether the then or else value of a choice is itself a choice.
 
-    A chain of `if` is then easier to read.
+    Such a choice is printed as a chain of `if`, not as `?:`.
     """
     return isinstance(choice.then, Select) or isinstance(choice.other, Select)
 
@@ -219,10 +218,11 @@ def is_nested(choice: Select) -> bool:
 def emit_select(
     declared_type: str, target: str, value: Expr, c_names: CNameMap, width: int = MAX_LINE_WIDTH
 ) -> Iterator[str]:
-    """Yield a chain of `if` that assigns the chosen value to `target`.
+    """Yield the lines of an `if`, `else if` chain that assigns the chosen value to `target`.
 
-    If `declared_type` is not empty, the target is declared first. A value that is no choice becomes
-    one assignment.
+    `target` is C text. If `declared_type` is not empty, the target is declared first with that
+    type. A choice in a then part becomes a nested chain. A value that is no choice becomes one
+    assignment.
     """
     if declared_type:
         yield f"{declared_type} {target};"
@@ -257,10 +257,11 @@ def _key_comment(key: str) -> str:
 def emit_wrapped_statement(
     left: str, text: str, key: str, width: int = MAX_LINE_WIDTH
 ) -> Iterator[str]:
-    """Yield the lines of `left text;` with a comment `key`.
+    """Yield the lines of `left`, `text` and `;`, with the comment `key` unless that is empty.
 
-    A comment that does not fit into the line stands above it. A statement longer than `width` is
-    broken before an operator.
+    The comment follows the statement if the line is then shorter than `width`; otherwise it is a
+    line above it. A statement that does not fit is broken before an operator, or at another blank;
+    further lines are indented by INDENT.
     """
     comment = _key_comment(key)
     if len(left) + len(text) + len(comment) < width:
@@ -291,9 +292,10 @@ def emit_wrapped_statement(
 
 
 def emit_condition(opening: str, test: str, key: str, width: int) -> Iterator[str]:
-    """Yield the lines of `opening (test) {` with a comment `key`.
+    """Yield the lines of `opening (test) {`, with the comment `key` unless that is empty.
 
-    A line longer than `width` is broken before `&&` or `||`.
+    The comment follows the brace if the line has at most `width` characters; otherwise it is a line
+    above it, and the line is broken before `&&` or `||`.
     """
     line, comment = f"{opening} ({test}) {{", _key_comment(key)
     if len(line) + len(comment) <= width:

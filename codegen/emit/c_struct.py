@@ -52,7 +52,7 @@ class PageLayout:
 
     @property
     def holds_solved(self) -> bool:
-        """Tell whether solved numbers are on the page."""
+        """Tell whether solved numbers are on the page: the group `solved` is in `groups`."""
         return "solved" in self.groups
 
 
@@ -81,14 +81,22 @@ class StructMember:
 
 
 def calibration_members(program: Program) -> list[StructMember]:
-    """Return the tunable parameters as members of the calibration page, with their defaults."""
+    """Return the tunable constants as members of the calibration page, in Program order.
+
+    `value` is the default, for a table the list of its values in braces.
+    """
     return [
         _constant_member(c, program.number_type) for c in program.constants if c.kind == "tunable"
     ]
 
 
 def struct_members(program: Program, layout: PageLayout) -> dict[str, Any]:
-    """Return the template context with the members of all structures of a module."""
+    """Return the template context with the members of all structures of a module.
+
+    Keys: calibration, derived, constants, axes, solved, solved_on_page, page (C type), inputs,
+    is_new, groups, memory, outputs. The solved numbers are under `solved_on_page` if the page holds
+    them, else under `solved`; the other list is empty.
+    """
     number, constants, variables = program.number_type, program.constants, program.variables
     solved = _solved_members([c for c in constants if c.kind == "solved"], number)
     return {
@@ -110,7 +118,11 @@ def struct_members(program: Program, layout: PageLayout) -> dict[str, Any]:
 
 
 def member_of(variable: Variable, number: NumberType) -> StructMember:
-    """Return a variable as a member; the comment holds the unit of a real, and `about`."""
+    """Return a variable as a member.
+
+    The comment is the unit of a real, followed by `; ` and its `about`, if any; for other types it
+    is `about` alone, which may be empty. `size` is the length of an array, 0 for a scalar.
+    """
     comment = display_unit(variable.unit) if variable.type == "real" else variable.about
     if variable.type == "real" and variable.about:
         comment = f"{display_unit(variable.unit)}; {variable.about}"

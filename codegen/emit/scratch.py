@@ -36,12 +36,15 @@ class Scratch:
 
     @property
     def is_zeroed(self) -> bool:
-        """Tell whether all of it is set to 0 at the start, because an array is initialised."""
+        """Tell whether the whole structure is set to 0 when the block begins.
+
+        This is the case if one of the `initialised` variables is an array.
+        """
         return any(variable.size for variable in self.initialised)
 
     @property
     def is_in_instance(self) -> bool:
-        """Tell whether the storage is a part of the instance instead of the stack."""
+        """Tell whether the storage is a part of the instance: it is larger than MAX_STACK_BYTES."""
         return self.size > MAX_STACK_BYTES
 
 
@@ -53,8 +56,10 @@ def scratch_of(
 ) -> Scratch | None:
     """Return the storage of the `shared` work variables of a step (rule C22).
 
-    Returns None if there are none, or no block `step`. With `allow_inner_block` the owner may be a
-    block that `step` runs.
+    Returns None if there are none, or no block `step`. The owner is `step`; with
+    `allow_inner_block` it is the innermost block that contains all uses and is run once, without a
+    loop around it. The size counts 8 bytes (float32: 4) for each scalar or array element, of any
+    type.
     """
     if not shared or STEP not in program.blocks:
         return None
@@ -92,8 +97,8 @@ def adjust_usages(
 ) -> dict[str, Usage]:
     """Return the usages of blocks for an owner other than `step`.
 
-    The owner and its callers no longer need a pointer to the work variables; they need the instance
-    if the variables are a part of it.
+    The blocks that reach the owner, and the owner itself, no longer need the pointer `work`; they
+    need and write `self` if the variables are a part of the instance. Other blocks are unchanged.
     """
     instance = frozenset({"self"} if scratch.is_in_instance else ())
     adjusted = dict(usage_by_block)
