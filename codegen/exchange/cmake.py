@@ -15,9 +15,10 @@ CMAKE_FILE = "CMakeLists.txt"
 
 
 def emit_cmake_file(program: Program) -> dict[str, str]:
-    """Return the CMake file by its name; it builds a static library and installs its header.
+    """Return the CMake file, under its name CMAKE_FILE.
 
-    Raises ValueError for a Program that has no C.
+    It builds the C files of `emit_c_files` as a static library and installs its headers. Raises
+    ValueError for a Program without a block `step`.
     """
     files = sorted(emit_c_files(program))
     context = {

@@ -66,9 +66,11 @@ def emit_dbc(
 ) -> str:
     """Return a DBC file with messages `X_In` that the automaton receives and `X_Out` that it sends.
 
-    Each signal has the bits of its C type in little-endian order. Signals that do not fit into one
-    frame are split over numbered messages, with consecutive identifiers from `first`. `ranges`
-    gives ranges [SI] of inputs by name. Raises ValueError if an identifier is invalid;
+    Each signal has the bits of its C type (BIT_LENGTH), little-endian, in the order of the inputs
+    or outputs, without gaps. Signals that do not fit into a frame of CAN_BYTES (CAN_FD_BYTES if
+    `is_fd`) are split over messages `X_In_1`, `X_In_2` and so on. Identifiers count up from `first`
+    over all messages; one above MAX_STANDARD_ID is extended. `ranges` gives ranges [SI] of inputs
+    by name; outputs have none. Raises ValueError if an identifier is not from 0 to MAX_EXTENDED_ID;
     MissingToolError if cantools is missing.
     """
     try:

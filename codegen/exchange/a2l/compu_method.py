@@ -33,8 +33,9 @@ MS_PER_SECOND = 1000
 def conversion_of(item: Variable | Constant, program: Program) -> Conversion:
     """Return the conversion of a variable or constant.
 
-    Enumerations, truth values, modes and transitions have names; a real has its unit; a counter of
-    ticks is displayed in ms if the Program has a period. All others are COUNT.
+    Enumerations, truth values, and variables with the number of a mode or transition have names. A
+    real has its unit, empty for the unit `1`. A timer or value in ticks is displayed in ms if the
+    Program has a period. All others are COUNT.
     """
     if item.values:
         return Conversion(names=tuple(enumerate(item.values)))

@@ -89,7 +89,7 @@ class ModuleDescription:
 
     @property
     def groups(self) -> dict[str, list[Measurement | Characteristic]]:
-        """The characteristics and measurements by group, in their order."""
+        """The characteristics, then the measurements, by group in order of first occurrence."""
         by_group: dict[str, list[Measurement | Characteristic]] = {}
         every: list[Measurement | Characteristic] = [*self.characteristics, *self.measurements]
         for one in every:
@@ -98,7 +98,12 @@ class ModuleDescription:
 
 
 def describe_module(program: Program) -> ModuleDescription:
-    """Return the measurements and characteristics of the C of a Program."""
+    """Return the measurements and characteristics of the C of a Program.
+
+    Measurements are the variables in the instance (not inputs and `work.`), then the derived
+    constants, then one bit for each fault. Characteristics are the tunable and solved constants.
+    Names begin with `<program>.`; the digest is that of the whole Program.
+    """
     step_program = restrict_to_step(program)
     c_names = CNames(step_program, solved_prefix="cal->solved.")
     measured = [

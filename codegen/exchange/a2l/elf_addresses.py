@@ -63,8 +63,8 @@ class Image:
     ) -> StructLocation:
         """Return the only candidate, or the one named `symbol` if that is not None.
 
-        `kind` is the C type for messages. Raises ImageError if there is no such candidate or more
-        than one.
+        `kind` is the C type, for messages. Raises ImageError, which lists the candidates, if there
+        is no such candidate or more than one.
         """
         chosen = [place for place in candidates if symbol in (None, place.symbol)]
         if len(chosen) == 1:
@@ -80,7 +80,11 @@ class Image:
 def read_image(path: Path, types: tuple[str, ...], string_symbols: tuple[str, ...] = ()) -> Image:
     """Read a linked program: locations of structures of the given C types, texts at symbols.
 
-    Raises ImageError; MissingToolError if pyelftools is missing.
+    `types` are names of typedefs. Variables with a fixed address are searched, with their members
+    and the first MAX_ARRAY_ELEMENTS elements of arrays; a type without a variable has an empty
+    tuple. A symbol of `string_symbols` that the file lacks is left out of `strings`; a text ends
+    after 256 characters. Raises ImageError if the file is unreadable, no ELF, or has no debug
+    information; MissingToolError if pyelftools is missing.
     """
     try:
         from elftools.common.exceptions import ELFError

@@ -58,18 +58,20 @@ class ModuleLocation:
     instance: StructLocation | None
 
     def structure_of(self, item: Measurement | Characteristic) -> StructLocation | None:
-        """Return the structure that contains an item: the page or the instance."""
+        """Return the page for a characteristic, the instance for a measurement; it may be None."""
         return self.page if isinstance(item, Characteristic) else self.instance
 
 
 def locate_module(
     program: Program, elf: Path, page: str | None = None, instance: str | None = None
 ) -> ModuleLocation:
-    """Return the locations of a page and an instance of a Program's C in a linked program.
+    """Return the locations of the calibration page and of one instance of a Program in an ELF file.
 
-    `page` and `instance` are symbols that select one of several. The default page `X_default_cal`
-    is preferred. Raises ImageError, also if the ELF was built from another Program;
-    MissingToolError.
+    `page` and `instance` are symbols that select one of several, like `app.selves[1]`. Without
+    `page`, `<program>_default_cal` is taken if it exists. Constant instances do not count; without
+    any other one, and without `instance`, the instance is None. Raises ImageError if several
+    candidates remain or none, if the file is unreadable, or if its digest differs from that of the
+    Program; MissingToolError if pyelftools is missing.
     """
     description = describe_module(program)
     types = f"{description.name}_{PAGE_STRUCT}", f"{description.name}_{INSTANCE_STRUCT}"
@@ -96,8 +98,9 @@ def locate_module(
 def emit_a2l(program: Program, location: ModuleLocation | None = None) -> str:
     """Return the A2L file of a Program's C as text.
 
-    Without a location, characteristics refer to symbols and measurements have no address. Raises
-    ImageError if the layout of the structures in the ELF differs.
+    Without a location, characteristics refer to symbols of `<program>_default_cal` and measurements
+    have no address; nor have they if the location has no instance. Raises ImageError if a member is
+    missing in the ELF or has another size there.
     """
     description = describe_module(program)
     methods = _conversion_methods(description, program.number_type)
@@ -141,7 +144,11 @@ def emit_a2l(program: Program, location: ModuleLocation | None = None) -> str:
 
 
 def sanitise_string(text: str) -> str:
-    """Return a text as one line of ASCII without backslashes and double quotes."""
+    """Return a text as one line of ASCII that is safe between double quotes in A2L.
+
+    Other characters become `?`, backslashes `/`, double quotes `'`; white space is collapsed and
+    stripped.
+    """
     plain = text.encode("ascii", "replace").decode()
     return re.sub(r"\s+", " ", plain.replace("\\", "/").replace('"', "'")).strip()
 

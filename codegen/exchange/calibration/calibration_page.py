@@ -21,7 +21,11 @@ STAMP_PREFIX = "solved.stamp_"
 
 
 def page_constants(program: Program) -> tuple[Constant, ...]:
-    """Return the constants of the page in its order: tunables, then solved numbers."""
+    """Return the constants of the page in its order: tunables, then solved numbers.
+
+    Within each kind they are in Program order; those that the C does not use (`restrict_to_step`)
+    are left out.
+    """
     constants = restrict_to_step(program).constants
     return tuple(
         constant
@@ -32,21 +36,29 @@ def page_constants(program: Program) -> tuple[Constant, ...]:
 
 
 def page_name(program: Program, constant: Constant) -> str:
-    """Return the name of a constant of the page in files of calibration tools."""
+    """Return the name of a constant of the page in files of calibration tools.
+
+    It is `<program>.<member>`, for a solved number `<program>.solved.<member>`; the member is that
+    of `c_member`.
+    """
     within = "solved." if constant.kind == "solved" else ""
     return f"{program.name}.{within}{c_member(constant.name)}"
 
 
 def page_characteristics(automaton: Automaton, program: Program) -> tuple[FileCharacteristic, ...]:
-    """Return the page of an automaton's Program as characteristics with its values."""
+    """Return the page of an automaton's Program as characteristics with its values.
+
+    They are in the order of `page_constants`. Values are texts in SI units; a wait, which the
+    Program holds in ticks, is in seconds.
+    """
     return tuple(_page_characteristic(automaton, program, c) for c in page_constants(program))
 
 
 def format_constant_value(value: float, constant: Constant, number: NumberType) -> str:
     """Return a value of a constant as text in a file.
 
-    A truth value is `true` or `false`, an enumeration value its name, a whole number an integer, a
-    real its shortest decimal.
+    A truth value is `true` or `false`, an enumeration index the name of its value, another whole
+    number an integer, a real its shortest decimal in the number type, without its unit.
     """
     if constant.type == "truth":
         return "true" if value else "false"
@@ -88,7 +100,7 @@ def _wait_as_time(automaton: Automaton, program: Program, constant: Constant) ->
 
 
 def axes_of(table: LookupTable, number: NumberType) -> tuple[FileAxis, ...]:
-    """Return the axes of a table with their compiled points, in SI units."""
+    """Return the axes of a table with their points, rounded to the number type, in SI units."""
     return tuple(
         FileAxis(
             tuple(

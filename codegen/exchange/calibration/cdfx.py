@@ -45,7 +45,11 @@ INDENT = " " * 10
 
 
 def format_cdfx(title: str, heading: Sequence[str], page: Sequence[FileCharacteristic]) -> str:
-    """Return a page as a CDFX file with a title and a comment of several parts."""
+    """Return a page as the text of a CDFX file.
+
+    `title` is the SHORT-NAME of the file and system. `heading` is a comment in the second line: its
+    parts joined with `, `, with `--` replaced by `- -`.
+    """
     comment = escape(", ".join(heading)).replace("--", "- -")
     lines = [f"{INDENT}{line}\n" for one in page for line in _format_instance(one)]
     return HEAD.format(title=escape(title), heading=comment) + "".join(lines) + TAIL

@@ -29,8 +29,10 @@ SHARED_AXIS_CATEGORIES = ("COM_AXIS", "RES_AXIS", "CURVE_AXIS")
 def read_cdfx(source: Source, data: bytes, problems: Problems, name_filter: NameFilter) -> PageFile:
     """Return the characteristics of a CDFX file whose names the filter accepts.
 
-    Problems are reported to `problems`; SpecError is raised at the end, or after MAX_PROBLEMS
-    errors.
+    Shared axes (SHARED_AXIS_CATEGORIES) are skipped; an instance of another unknown category is
+    skipped with a warning. Problems are reported to `problems`; SpecError is raised at the end if
+    one is an error, after MAX_PROBLEMS errors, or at once if the data is no XML with the root
+    MSRSW. `source` is for positions only.
     """
     root = parse_xml(source, data)
     if root.tag != "MSRSW":

@@ -33,7 +33,11 @@ SUPERSCRIPTS = str.maketrans(
 
 
 def parse_cell_number(cell: Cell, problems: Problems) -> Fraction | None:
-    """Return the exact number of a cell; None with a problem reported for any other text."""
+    """Return the exact number of a cell; None with a problem reported for any other text.
+
+    A number is decimal with a point, with an optional exponent of at most MAX_EXPONENT, and has at
+    most MAX_LENGTH characters. Blanks, a decimal comma, NaN and infinities are problems.
+    """
     text = cell.text
     shown = truncate(text, MAX_SHOWN)
     label = f"`{shown}` is not a number"
@@ -52,10 +56,10 @@ def parse_cell_number(cell: Cell, problems: Problems) -> Fraction | None:
 
 
 def parse_unit_cell(cell: Cell | None, declared_unit: Unit, problems: Problems) -> Unit | None:
-    """Return the unit of a cell; the SI unit of `declared_unit` if the cell is None or empty.
+    """Return the unit of a cell; the SI unit of `declared_unit` if the cell is None or blank.
 
-    Returns None with a problem reported if the unit is unknown or has another dimension than
-    `declared_unit`.
+    Spellings of tools (UNIT_SYNONYMS, SUPERSCRIPTS, MISSPELLED_UNITS) are accepted. Returns None
+    with a problem reported if the unit is unknown or has another dimension than `declared_unit`.
     """
     si = Unit(str(declared_unit.dimension), Fraction(1), declared_unit.dimension)
     if cell is None or not cell.text.strip() or cell.text == si.text:

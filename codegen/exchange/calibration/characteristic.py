@@ -53,12 +53,15 @@ class PageFile:
 
 
 def transpose_map(values: Sequence[Cell], columns: int) -> tuple[Cell, ...]:
-    """Return the values of a map, given row by row with `columns` values each, column by column."""
+    """Return the values of a map column by column.
+
+    `values` are given row by row, with `columns` values in each row.
+    """
     return tuple(cell for column in range(columns) for cell in values[column::columns])
 
 
 def report_duplicates(characteristics: Iterable[FileCharacteristic], problems: Problems) -> None:
-    """Report an error for each name that occurs again in a file."""
+    """Report an error at each further occurrence of a name, with the position of the first one."""
     first: dict[str, Span] = {}
     for one in characteristics:
         place = first.setdefault(one.name.text, one.name.span)
@@ -68,6 +71,6 @@ def report_duplicates(characteristics: Iterable[FileCharacteristic], problems: P
 
 
 def stop_if_many(problems: Problems) -> None:
-    """Raise SpecError if a file has MAX_PROBLEMS errors or more."""
+    """Raise SpecError if MAX_PROBLEMS errors or more are reported; warnings do not count."""
     if sum(problem.severity == "error" for problem in problems.reported) >= MAX_PROBLEMS:
         problems.raise_if_errors()

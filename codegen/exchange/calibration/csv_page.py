@@ -42,7 +42,11 @@ class _ReadContext:
 
 
 def format_csv(title: str, heading: Sequence[str], page: Sequence[FileCharacteristic]) -> str:
-    """Return a page as CSV; `title` and `heading` are ignored, because CSV has no comments."""
+    """Return a page as CSV with the header COLUMNS and one line for each value.
+
+    The separator is a comma. Cells of absent units and axes are empty. `title` and `heading` are
+    ignored, because CSV has no comments.
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
@@ -66,8 +70,10 @@ def _format_rows(characteristic: FileCharacteristic) -> Iterator[tuple[str, ...]
 def read_csv(source: Source, text: str, problems: Problems, name_filter: NameFilter) -> PageFile:
     """Return the characteristics of a CSV page whose names the filter accepts.
 
-    The lines of one name must be consecutive. Problems are reported to `problems`; SpecError is
-    raised at the end, or after MAX_PROBLEMS errors.
+    The separator is the one of SEPARATORS that is most frequent in the first line, which names the
+    columns (COLUMNS, in any order and case). The lines of one name must be consecutive and form a
+    full grid over x and y, y fastest. Problems are reported to `problems`; SpecError is raised for
+    wrong columns, at the end if there are errors, or after MAX_PROBLEMS errors.
     """
     context = _ReadContext(source, problems, name_filter)
     groups: dict[str, list[Row]] = {}

@@ -18,9 +18,10 @@ VALUES_PER_LINE = 6
 
 
 def format_dcm(title: str, heading: Sequence[str], page: Sequence[FileCharacteristic]) -> str:
-    """Return a page as a DCM file.
+    """Return a page as the text of a DCM 2.0 file.
 
-    `title` is the function of all characteristics, `heading` a comment.
+    `title` is the function (FKT) of all characteristics. Each text of `heading` is a comment line
+    that begins with `* `.
     """
     lines = [f"* {line}" for line in heading]
     lines += ["", "KONSERVIERUNG_FORMAT 2.0", "", "FUNKTIONEN"]

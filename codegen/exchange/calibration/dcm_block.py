@@ -49,13 +49,15 @@ class DcmBlock:
 
 
 def is_count(text: str) -> bool:
-    """Tell whether a text is a whole number from 1 to MAX_VALUES."""
+    """Tell whether a text is a whole number from 1 to MAX_VALUES, in fewer than 8 ASCII digits."""
     return text.isascii() and text.isdecimal() and len(text) < 8 and 0 < int(text) <= MAX_VALUES
 
 
 def characteristic_of(block: DcmBlock, problems: Problems) -> FileCharacteristic | None:
     """Return a block as a characteristic.
 
+    The values of a map or matrix, which a file gives row by row of its second axis, are transposed.
+    The values of a shared axis are its points. `block.sizes` must fit the kind of the block.
     Returns None with problems reported if it has both numbers and texts, or if the numbers of
     values or points differ from the sizes in its head.
     """

@@ -60,8 +60,10 @@ class _ReadContext:
 def read_dcm(source: Source, problems: Problems, name_filter: NameFilter) -> PageFile:
     """Return the characteristics of a DCM file whose names the filter accepts.
 
-    Problems are reported to `problems`; SpecError is raised at the end, or after MAX_PROBLEMS
-    errors.
+    Shared axis points (STUETZSTELLENVERTEILUNG) and blocks of other names are skipped; an unknown
+    keyword inside a block is a warning. Problems are reported to `problems`; SpecError is raised at
+    the end if one is an error, after MAX_PROBLEMS errors, or at once if the format line is missing
+    or a block has no END.
     """
     context = _ReadContext(_blank_other_blocks(source, name_filter), problems)
     lines = _word_lines(context)

@@ -21,8 +21,8 @@ UTF16_BOM = (b"\xff\xfe", b"\xfe\xff")
 def read_bytes(path: Path, display_name: str) -> bytes:
     """Return the contents of a file; `display_name` names it in messages.
 
-    Raises SpecError for a path that is no readable regular file, or is empty or larger than
-    MAX_BYTES.
+    Raises SpecError for a path that is no readable regular file, for a file larger than MAX_BYTES,
+    and for one that is empty or only white space.
     """
     place = Span(Source(display_name), 1, 1)
     problems = Problems()
@@ -52,8 +52,9 @@ def decode_text(
 ) -> tuple[Source, str]:
     """Return the source of a file, split into lines, and its text.
 
-    The text is decoded as UTF-8, else in `fallback_encoding` if that is not None. Raises SpecError
-    for UTF-16, undecodable bytes and control characters.
+    The text is decoded as UTF-8, without a byte order mark, else in `fallback_encoding` if that is
+    not None. Raises SpecError for UTF-16 (by its byte order mark), undecodable bytes and
+    CONTROL_CHARACTERS. Any of CR LF, CR and LF ends a line; the text keeps them.
     """
     problems = Problems()
     if data.startswith(UTF16_BOM):

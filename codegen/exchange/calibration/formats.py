@@ -67,9 +67,9 @@ FORMATS: Mapping[str, Format] = {
 
 
 def format_name(path: Path, explicit_format: str | None = None) -> str | None:
-    """Return the name of the explicit format, else of the extension of a file.
+    """Return the explicit format, else the extension of the file in lower case without its dot.
 
-    Returns None if it is unknown.
+    Returns None if that is not a key of FORMATS.
     """
     name = explicit_format or path.suffix.lower().removeprefix(".")
     return name if name in FORMATS else None
@@ -83,7 +83,8 @@ def read_page(
 ) -> PageFile:
     """Return the characteristics of a calibration file whose names the filter accepts; all if None.
 
-    Raises SpecError with all problems, also for an unknown format and for duplicate names.
+    The format is that of `format_name`. Problems are reported to `problems`; raises SpecError for
+    an unreadable file, an unknown format, duplicate names and errors of the format's reader.
     """
     name = display_path(path)
     data = read_bytes(path, name)

@@ -38,7 +38,10 @@ class ImportContext:
     remarks: list[Remark] = field(default_factory=list)
 
     def add_remark(self, kind: RemarkKind, cell: Cell, text: str, at: Span | None = None) -> None:
-        """Append a remark on a cell; its position is `at`, or that of the cell."""
+        """Append a remark on a cell, at the position `at`, or at that of the cell.
+
+        Its name is the text of the cell.
+        """
         self.remarks.append(Remark(kind, cell.text, text, at or cell.span))
 
 
@@ -51,9 +54,10 @@ def convert_real(
 ) -> float | None:
     """Return the value of a cell in SI units, rounded to the number type.
 
-    A remark is added if the unit was converted or if rounding changed the number. Returns None with
-    a problem reported for a text that is not a number and for a value outside the range of the
-    parameter.
+    `unit` is the unit of the cell; only its name in a remark comes from `characteristic`. A remark
+    `converted` is added if the unit is no SI unit, else `rounded` if rounding changed the number.
+    Returns None with a problem reported for a text that is not a number, for a number too large for
+    the type, and for a value outside the range of the parameter.
     """
     number = parse_cell_number(cell, context.problems)
     value = None if number is None else convert_to_si(number, unit, cell, context)
@@ -86,8 +90,8 @@ def resolve_unit(
 ) -> Unit | None:
     """Return the unit of values: that of `cell`, else the SI unit of `declared_unit`.
 
-    A missing unit adds a remark unless the values are dimensionless. Returns None with a problem
-    reported if the unit is unknown or incompatible.
+    A missing unit (None or blank) adds a remark `no unit` on the characteristic, unless the values
+    are dimensionless. Returns None with a problem reported if the unit is unknown or incompatible.
     """
     unit = parse_unit_cell(cell, declared_unit, context.problems)
     if unit and (cell is None or not cell.text.strip()) and not declared_unit.dimension.is_number:
@@ -98,9 +102,9 @@ def resolve_unit(
 
 
 def convert_to_si(number: Fraction, unit: Unit, cell: Cell, context: ImportContext) -> float | None:
-    """Return a number in SI units, rounded to the number type.
+    """Return `number * factor + offset` of a unit, rounded to the number type of the context.
 
-    Returns None with a problem reported if it is too large for the type.
+    Returns None with a problem reported at `cell` if it is too large for the type.
     """
     value = round_to_type(number * unit.factor + unit.offset, context.number)
     if abs(value) != float("inf"):

@@ -22,7 +22,10 @@ class NameFilter:
     skipped: dict[str, Cell] = field(default_factory=dict)
 
     def accepts(self, name: Cell) -> bool:
-        """Tell whether the filter accepts a name; a rejected name is added to `skipped`."""
+        """Tell whether the filter accepts a name.
+
+        The first occurrence of a rejected name is stored in `skipped`.
+        """
         if not self.owner or name.text.startswith(f"{self.owner}."):
             return True
         self.skipped.setdefault(name.text, name)

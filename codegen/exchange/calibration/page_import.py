@@ -74,8 +74,10 @@ def import_values(
 ) -> ImportedValues:
     """Return the values that a file gives for the page of an automaton, with remarks.
 
-    Names that the filter rejected and constants that are not in the file have a remark. Raises
-    SpecError with all problems.
+    Values of parameters are YAML nodes in the unit of the parameter. Names that the filter rejected
+    have a remark `passed over`, constants that are not in the file a remark `missing`. Invalid
+    values, names that are not on the page, and a file in which the filter rejected all names are
+    errors. Raises SpecError at the end if any was reported to `problems`.
     """
     constants = {page_name(program, constant): constant for constant in page_constants(program)}
     context = ImportContext(automaton, program.number_type, problems)

@@ -29,7 +29,9 @@ def read_table(
 ) -> YamlNode | None:
     """Return the values of a table as a node of a calibration overlay, at the points of the spec.
 
-    Returns None with problems reported if the file has other points or an invalid value.
+    A file without axes is accepted if the number of values is right. Points are compared in SI
+    units after rounding to the number type. Returns None with problems reported if the file has
+    other points or an invalid value. `parameter` must have a table.
     """
     assert parameter.table
     problem_count = len(context.problems.reported)

@@ -27,15 +27,19 @@ class Element:
 
     @property
     def text(self) -> str:
-        """The text directly inside the element, without surrounding white space."""
+        """The text directly inside the element, without that of its children, stripped."""
         return "".join(self.pieces).strip()
 
     def find_all(self, tag: str) -> Iterator[Element]:
-        """Return an iterator over the children with a tag."""
+        """Return an iterator over the direct children with a tag."""
         return (child for child in self.children if child.tag == tag)
 
     def find(self, *path: str) -> Element | None:
-        """Return the first element at a path of tags below this one; None if there is none."""
+        """Return the element at a path of tags below this one; None if there is none.
+
+        Of several children with a tag the first is taken, without a search in the others. An empty
+        path gives the element itself.
+        """
         element: Element | None = self
         for tag in path:
             element = next(element.find_all(tag), None) if element else None
@@ -103,10 +107,11 @@ class _Builder:
 
 
 def parse_xml(source: Source, data: bytes) -> Element:
-    """Return the root element of an XML document.
+    """Return the root element of an XML document; tags are without their prefix.
 
-    Raises SpecError for malformed XML, an unknown encoding, entity declarations or too deep
-    nesting.
+    Raises SpecError for malformed XML, an unknown encoding, entity or element declarations,
+    references to unknown entities, and more than MAX_DEPTH nested elements. An external document
+    type is not read. `source` is for positions only.
     """
     parser = expat.ParserCreate()
     parser.buffer_text = True

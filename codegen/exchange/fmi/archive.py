@@ -48,7 +48,8 @@ PLATFORMS: Mapping[tuple[str, str], Platform] = {
 def binary_path(name: str, version: Version) -> str:
     """Return the path in an FMU of the binary for this machine.
 
-    Raises BuildError for a platform that FMI has no name for.
+    It is `binaries/<platform>/<name><suffix>`. Raises BuildError for a machine that is not in
+    PLATFORMS.
     """
     machine = (platform.system(), platform.machine())
     if machine not in PLATFORMS:
@@ -58,10 +59,11 @@ def binary_path(name: str, version: Version) -> str:
 
 
 def build_binary(files: Mapping[str, bytes], headers: Mapping[str, bytes]) -> bytes:
-    """Compile the sources of an FMU and return the shared library.
+    """Compile the sources of an FMU and return the contents of the shared library.
 
-    The headers of the standard are system headers for the compiler, which gives no warnings for
-    them. Raises MissingToolError, BuildError.
+    `files` are sources and headers by path; folders are dropped. A file whose name is in `headers`
+    (those of the standard) is a system header, for which the compiler gives no warnings. Raises
+    MissingToolError, BuildError.
     """
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         ours, standard = Path(name) / "sources", Path(name) / "standard"
@@ -91,10 +93,11 @@ UNIX = 3
 
 
 def build_fmu(program: Program, version: Version, is_source_only: bool = False) -> bytes:
-    """Return an FMU of a Program as bytes, with a binary for this machine or with sources only.
+    """Return an FMU of a Program as the bytes of a zip file.
 
-    Raises ValueError as `emit_fmu_files` does; MissingToolError and BuildError if a binary is
-    built.
+    It contains the files of `emit_fmu_files`, and a binary for this machine unless
+    `is_source_only`. The entries have the time ZIP_EPOCH. Raises ValueError as `emit_fmu_files`
+    does; MissingToolError and BuildError if a binary is built.
     """
     files = emit_fmu_files(program, version)
     if not is_source_only:

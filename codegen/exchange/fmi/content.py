@@ -28,7 +28,9 @@ COMPILER_OPTIONS = "-ffp-contract=off -fno-fast-math"
 def emit_fmu_files(program: Program, version: Version) -> dict[str, bytes]:
     """Return the files of an FMU without a binary, by their path in it, in sorted order.
 
-    Raises ValueError for an unknown version and for a Program that has no C.
+    They are `modelDescription.xml` and, below `sources/`, the C files of the Program, the wrapper,
+    the headers of the standard and (FMI 3 only) `buildDescription.xml`. Raises ValueError for an
+    unknown version and for a Program without a block `step`.
     """
     if version not in VERSIONS:
         known = " and ".join(map(str, VERSIONS))
@@ -44,19 +46,19 @@ def emit_fmu_files(program: Program, version: Version) -> dict[str, bytes]:
 
 
 def emit_wrapper(program: Program, version: Version) -> dict[str, str]:
-    """Return the C file that implements the functions of FMI for a Program, by its name."""
+    """Return the C file that implements the functions of FMI, by its name `<program>_fmu.c`."""
     context = fmu_context(program, version)
     return {f"{program.name}_fmu.c": render(f"fmi/fmi_{version}.c.jinja", context)}
 
 
 def read_headers(version: Version) -> dict[str, bytes]:
-    """Return the contents of the headers of a version by name."""
+    """Return the contents of the headers of an FMI version by name, as in HEADERS."""
     folder = resources.files("codegen.exchange.fmi").joinpath("headers")
     return {name: folder.joinpath(name).read_bytes() for name in HEADERS[version]}
 
 
 def instantiation_token(program: Program, version: Version) -> str:
-    """Return the token that ties a description to its binary, a UUID.
+    """Return the token that ties a description to its binary: a UUID of version 5 in braces.
 
     It is computed from the version of the product, the version of FMI, and the name and digest of
     the Program.
@@ -66,7 +68,12 @@ def instantiation_token(program: Program, version: Version) -> str:
 
 
 def fmu_context(program: Program, version: Version) -> dict[str, Any]:
-    """Return the context of the templates of an FMU."""
+    """Return the context of the templates of an FMU.
+
+    `period` is the period of the Program, or its major step if it is continuous, as the text of a
+    float; `over` and `under` are its numerator and denominator. `variables` are numbered from 0 in
+    the order of `variables_of`.
+    """
     variables = variables_of(program, version)
     period = program.period or program.major_step
     return {

@@ -50,7 +50,11 @@ class Enumeration:
 
 
 def enumerations_of(program: Program) -> tuple[Enumeration, ...]:
-    """Return the enumeration types of a Program: modes, region modes, run modes, value lists."""
+    """Return the enumeration types of a Program.
+
+    These are, in this order, `type.mode`, `type.region.<region>` for each region, `type.run_mode`
+    if there are run modes, and `type.values.<owner>` for each list of `enumerations`.
+    """
     types = [_mode_enumeration("mode", program.modes)]
     types += [_mode_enumeration(f"region.{info.name}", info.modes) for info in program.regions]
     if program.run_modes:
@@ -65,9 +69,12 @@ def enumerations_of(program: Program) -> tuple[Enumeration, ...]:
 
 
 def enumeration_name(program: Program, name: str, values: tuple[str, ...] = ()) -> str:
-    """Return the type name of a variable or constant with enumeration `values`.
+    """Return the name of the enumeration type of a variable or constant; empty if it has none.
 
-    Returns an empty text if it has no type.
+    It is that of the mode variable, the run mode or a region's mode if `name` is one of them,
+    whatever `values` is. Otherwise it is `type.values.<owner>`, where the owner is the first
+    constant or variable with the same `values`; StopIteration if there is none. It is empty without
+    `values`.
     """
     if name == MODE_VARIABLE:
         return f"{TYPE_PREFIX}mode"
@@ -107,7 +114,9 @@ FAULT_WORD = "memory.faults"
 def variables_of(program: Program, version: Version) -> tuple[FmuVariable, ...]:
     """Return the variables of an FMU: time, inputs, parameters, outputs, locals, faults.
 
-    Names are those of the spec. A name that occurs again gets its causality as a prefix.
+    Names are those of the spec; an element of a table is `<name>[k]` with k from 1. Locals are
+    scalars of the instance (LOCAL_PREFIXES, last transitions, the fault word) that are no source of
+    an output. A name that occurs again gets its causality and a dot as a prefix.
     """
     program = restrict_to_step(program)
     variables = [
@@ -303,6 +312,6 @@ def _make_names_unique(variables: Sequence[FmuVariable]) -> Iterator[FmuVariable
 def used_enumerations(
     program: Program, variables: Sequence[FmuVariable]
 ) -> tuple[Enumeration, ...]:
-    """Return the enumeration types that at least one of the variables has."""
+    """Return the types of `enumerations_of` that a variable has as `declared`, in that order."""
     declared = {variable.declared for variable in variables}
     return tuple(one for one in enumerations_of(program) if one.name in declared)

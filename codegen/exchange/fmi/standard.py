@@ -47,12 +47,17 @@ class UnsupportedFunction:
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """The names of the parameters."""
+        """The names of the parameters, without types, stars and brackets."""
         return tuple(parameter.split()[-1].strip("*[]") for parameter in self.parameters)
 
 
 def unsupported_functions(version: Version) -> Iterator[UnsupportedFunction]:
-    """Yield the functions of a version that are not implemented, in the order of the header."""
+    """Yield the functions of a version that an FMU exports but does not support, in header order.
+
+    These are the functions of `fmi<version>FunctionTypes.h` that return a status and are neither in
+    IMPLEMENTED nor a get or set function of FMI_TYPES. The reason is that of the first pattern of
+    UNSUPPORTED_REASONS in the name.
+    """
     file = resources.files("codegen.exchange.fmi").joinpath(
         "headers", f"fmi{version}FunctionTypes.h"
     )

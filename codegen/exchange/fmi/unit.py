@@ -25,13 +25,16 @@ class UnitDefinition:
 def unit_name(text: str) -> str:
     """Return the display name of a unit of a Program.
 
-    Returns an empty text for a pure number and for an invalid unit.
+    Returns an empty text for a pure number, for an invalid unit and for an empty text.
     """
     return display_unit(text) if text and _is_unit(text) else ""
 
 
 def unit_definitions(texts: Iterable[str]) -> tuple[UnitDefinition, ...]:
-    """Return the definitions of units of a Program, each once, in the order of their names."""
+    """Return the definitions of units of a Program, each once, in the order of their names.
+
+    Texts without a `unit_name` are left out. The exponents are nonzero, in the order of BASE_ORDER.
+    """
     named = {unit_name(text): text for text in texts if unit_name(text)}
     return tuple(UnitDefinition(name, _exponents(named[name])) for name in sorted(named))
 

@@ -69,12 +69,19 @@ class FmuVariable:
 
     @property
     def role(self) -> str:
-        """The C constant that tells whether an importer may set the variable."""
+        """The C constant that tells whether an importer may set it: INPUT, PARAMETER or SHOWN.
+
+        SHOWN, for all other causalities, is read only.
+        """
         return ROLES.get(self.causality, "SHOWN")
 
 
 def fmi_type(version: Version, storage_type: str) -> str:
-    """Return the FMI type whose functions access a value of a C type."""
+    """Return the FMI type whose functions access a value of a C type.
+
+    It is Boolean for `bool` and `fault`. Version 2 has Real for `double` and `float`, Integer for
+    others; version 3 has the type of FMI3_TYPE_OF (KeyError for another C type).
+    """
     if storage_type in ("bool", "fault"):
         return "Boolean"
     if version == 3:
@@ -83,5 +90,5 @@ def fmi_type(version: Version, storage_type: str) -> str:
 
 
 def fmi_enumeration_type(version: Version) -> str:
-    """Return the FMI type whose functions access an enumeration."""
+    """Return the FMI type whose functions access an enumeration: Integer (FMI 2) or Int64."""
     return "Integer" if version == 2 else "Int64"
