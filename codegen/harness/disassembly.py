@@ -37,7 +37,7 @@ class Instruction:
 
     @property
     def target(self) -> str:
-        """The target address of a branch or call; empty if its operands name none."""
+        """The target address of a branch or call in hexadecimal; empty if there is none."""
         match = re.search(r"\b([0-9a-f]+) <", self.operands)
         return match[1] if match else ""
 
@@ -47,7 +47,9 @@ def disassemble(
 ) -> Mapping[str, tuple[Instruction, ...]]:
     """Compile and link C files for a Cortex-M4F; return the instructions of each function by name.
 
-    Only functions that `entry` needs are linked. Raises MissingToolError, BuildError.
+    `sources` are names of files in `folder`, where the image is written too. Only functions that
+    `entry` needs are linked; those of libraries are included. Data between instructions are left
+    out. Raises MissingToolError, BuildError.
     """
     words = [
         *CORTEX_FLAGS,

@@ -43,9 +43,10 @@ class ComparedVariable:
 
 
 def compared_variables(program: Program) -> tuple[ComparedVariable, ...]:
-    """Return the variables of the instance that are compared after each tick.
+    """Return the variables of the instance that are compared after each tick, in Program order.
 
-    Arrays are left out: the values of a ring buffer are compared when they are read from it.
+    Left out are arrays (the values of a ring buffer are compared when they are read from it) and
+    the groups `work`, `input`, `is_new` and `check`. `kind` is `real`, or `whole` for all others.
     """
     program = restrict_to_step(program)
     kinds = {"real": "real", "truth": "whole", "whole": "whole"}
@@ -58,7 +59,10 @@ def compared_variables(program: Program) -> tuple[ComparedVariable, ...]:
 
 
 def tick_inputs(program: Program) -> tuple[Variable, ...]:
-    """Return the inputs of a tick, including the flags for new values, in their order."""
+    """Return the variables of the groups `input` and `is_new`, in Program order.
+
+    The latter are flags for new values.
+    """
     return tuple(
         variable
         for variable in program.variables
@@ -67,7 +71,10 @@ def tick_inputs(program: Program) -> tuple[Variable, ...]:
 
 
 def tunable_constants(program: Program) -> tuple[Constant, ...]:
-    """Return the tunable parameters that are real scalars, in the order of the page."""
+    """Return the tunable parameters that are real scalars, in Program order.
+
+    Those that the C does not use (`restrict_to_step`) are left out.
+    """
     program = restrict_to_step(program)
     return tuple(
         constant
@@ -85,7 +92,9 @@ def write_harness(
 ) -> list[Path]:
     """Write the C files of a Program and a main around them; return the C files to compile.
 
-    `extra_context` extends the context that the template of every main reads.
+    Files of the harness are in a subfolder `harness`. `machine` adds its own files to those of
+    `main`. `extra_context` extends the context of the template of `main`, and wins over it. Raises
+    ValueError for a Program without a block `step`.
     """
     (folder / "harness").mkdir(exist_ok=True)
     own = (*machine.files, *main.files)
@@ -109,6 +118,7 @@ def build_executable(
 ) -> Iterator[Path]:
     """Yield the path of the compiled harness of a Program, from the cache if it was built before.
 
+    If the cache cannot be used, the path is in a temporary folder that is removed at the end.
     Raises MissingToolError, BuildError.
     """
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:

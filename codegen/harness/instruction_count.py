@@ -43,7 +43,8 @@ def count_instructions(
 ) -> InstructionCounts:
     """Count the instructions of each step on input records of a harness.
 
-    QEMU counts executed instructions, without wait states. Raises MissingToolError, BuildError.
+    QEMU counts executed instructions of a Cortex-M4F, without wait states; the call of the step
+    counts too. Raises MissingToolError, BuildError.
     """
     with build_executable(program, flags, machine=CORTEX_M4F, main=COUNTING_MAIN) as steps:
         output = run_in_qemu(steps, records, ICOUNT_OPTIONS)

@@ -53,14 +53,15 @@ class Metrics:
 
     @property
     def rom(self) -> int:
-        """The sum of code, constants and the default page."""
+        """The sum of code, constants and the default page [bytes]."""
         return self.code + self.constants + self.page
 
 
 def measure_code(program: Program) -> Metrics:
     """Compile the C of a Program for a Cortex-M4F with `-O2` and measure it.
 
-    Raises MissingToolError, BuildError.
+    The function that is measured is `<program>_Step`. Without a bound of its instructions `longest`
+    is None. Raises MissingToolError, BuildError.
     """
     name = program.name
     with tempfile.TemporaryDirectory(prefix="modewright-") as folder_name:

@@ -28,9 +28,10 @@ class SanitizerReport:
 
 
 def build_sanitised(compiler: str, sources: Sequence[Path], folder: Path, extra: str = "") -> Path:
-    """Compile C files with sanitizers; return the executable in `folder`.
+    """Compile C files with SANITIZERS at -O1; return the executable APP in `folder`.
 
-    `extra` is prepended to the list of sanitizers. Raises MissingToolError, BuildError.
+    `extra` is put before the list of sanitizers, with its own comma, like `fuzzer,`. Raises
+    MissingToolError, BuildError.
     """
     flags = [flag for flag in FLAGS if flag != "-O2"]
     sanitizers = [f"-fsanitize={extra}{SANITIZERS}", "-fno-sanitize-recover=all"]
@@ -42,10 +43,11 @@ def build_sanitised(compiler: str, sources: Sequence[Path], folder: Path, extra:
 def run_sanitised(
     app: Path, arguments: Sequence[str] = (), stdin: bytes = b"", timeout: float | None = None
 ) -> SanitizerReport:
-    """Run a sanitised program in its folder and return its report.
+    """Run a sanitised program in its folder and return its error output with its first error.
 
-    A nonzero exit code without a reported error is a finding too. Raises BuildError after `timeout`
-    seconds.
+    `findings` has at most one text: the first line with one of ERROR_MARKERS, from its last slash
+    on; without such a line, a nonzero exit code. Leaks are not searched. Raises BuildError after
+    `timeout` seconds.
     """
     options = os.environ | {"ASAN_OPTIONS": "detect_leaks=0"}
     try:

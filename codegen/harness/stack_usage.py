@@ -59,7 +59,9 @@ class StackUsage:
 def stack_usage(folder: Path, sources: Sequence[str], entry: str) -> StackUsage:
     """Compile C files for a Cortex-M4F and return the stack usage of a function.
 
-    Raises MissingToolError; BuildError also if `entry` is not in the compiled code.
+    The bound is the largest sum of frames over all call chains; a function of unknown frame counts
+    0 and a recursive one twice. Names are sorted. Raises MissingToolError; BuildError also if
+    `entry` is not in the compiled code.
     """
     output_of([ARM_COMPILER, *CORTEX_FLAGS, *FLAGS, "-fcallgraph-info=su", "-c", *sources], folder)
     calls = _read("\n".join((folder / f"{Path(s).stem}.ci").read_text() for s in sources))
@@ -76,9 +78,10 @@ def stack_usage(folder: Path, sources: Sequence[str], entry: str) -> StackUsage:
 
 
 def check_stack(folder: Path, sources: Sequence[str], entry: str) -> ToolVerdict:
-    """Return the verdict on a stack: at most LIMIT bytes, no recursion, fixed frame sizes.
+    """Return the verdict on a stack: at most MAX_STEP_STACK_BYTES, no recursion, fixed frame sizes.
 
-    Raises MissingToolError.
+    Functions of unknown frame are named in `about` and are no finding. A compilation error is a
+    finding, with `no result` as `about`. Raises MissingToolError.
     """
     tool = f"{ARM_COMPILER} {tool_version(ARM_COMPILER, folder)}"
     try:

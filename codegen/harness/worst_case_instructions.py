@@ -32,7 +32,8 @@ class UnboundedError(Exception):
 def worst_case_instructions(folder: Path, sources: Sequence[str], entry: str) -> int:
     """Return the maximum number of instructions from the call of a function until it returns.
 
-    Raises MissingToolError, BuildError, Unbounded.
+    The C files are compiled as by `disassemble`. Raises MissingToolError, BuildError, and
+    UnboundedError as `longest_path` does.
     """
     return longest_path(disassemble(folder, sources, entry), entry)
 
@@ -40,7 +41,8 @@ def worst_case_instructions(folder: Path, sources: Sequence[str], entry: str) ->
 def longest_path(functions: Mapping[str, Function], entry: str) -> int:
     """Return the maximum number of instructions of a function with all its callees.
 
-    Raises Unbounded.
+    Every loop counts with all its iterations. Raises UnboundedError for a callee that is not in
+    `functions`, a table of branches, and a loop whose number of iterations no C loop tells.
     """
     return _LongestPaths(functions).instructions_of(entry)
 
@@ -169,7 +171,10 @@ class _ControlFlowGraph:
 
 
 def is_branch(instruction: Instruction) -> bool:
-    """Tell whether an instruction may continue at another address."""
+    """Tell whether an instruction is cbz, cbnz, or b with or without a condition code.
+
+    A suffix such as `.n` is ignored; calls (bl, blx) and bx are no branches.
+    """
     name = instruction.name.partition(".")[0]
     return name in ("cbz", "cbnz") or (name[:1] == "b" and bool(CONDITION.fullmatch(name[1:])))
 
@@ -177,7 +182,8 @@ def is_branch(instruction: Instruction) -> bool:
 def is_call(instruction: Instruction, is_local_target: bool) -> bool:
     """Tell whether an instruction calls a function, or continues in another function (tail call).
 
-    Raises Unbounded for a branch table.
+    These are bl, blx, and a branch unless `is_local_target`: its target is in the same function.
+    Raises UnboundedError for a table of branches (tbb, tbh).
     """
     name = instruction.name.partition(".")[0]
     if name in ("tbb", "tbh"):
@@ -186,6 +192,9 @@ def is_call(instruction: Instruction, is_local_target: bool) -> bool:
 
 
 def has_no_fall_through(instruction: Instruction) -> bool:
-    """Tell whether the next instruction in memory never follows an instruction."""
+    """Tell whether the next instruction in memory never follows an instruction.
+
+    These are b and bx without a condition, and `pop` and `ldmia` with `pc` among the operands.
+    """
     name = instruction.name.partition(".")[0]
     return name in ("b", "bx") or (name in ("pop", "ldmia") and "pc" in instruction.operands)
