@@ -46,17 +46,18 @@ class Usage:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """The needed pointers in the order of the parameters of a function."""
+        """The needed pointers in the order of POINTER_ORDER."""
         return tuple(name for name in POINTER_ORDER if name in self.needs)
 
 
 def block_usages(
     program: Program, local: Mapping[str, frozenset[str]], page_groups: frozenset[str] = PAGE_GROUPS
 ) -> dict[str, Usage]:
-    """Return the usage of every block by name.
+    """Return the usage of every block by name, including that of the blocks that it runs.
 
     `local` holds the local variables of each block, which need no pointer. `page_groups` are the
-    groups of constants on the calibration page.
+    groups of constants on the calibration page; names of other groups that are not in
+    POINTER_OF_GROUP need no pointer.
     """
     groups = {**POINTER_OF_GROUP, **dict.fromkeys(page_groups, "cal")}
     usage_by_block: dict[str, Usage] = {}
@@ -85,9 +86,9 @@ def locals_of(
 ) -> dict[str, frozenset[str]]:
     """Return for each block the work variables that are local to its function.
 
-    These are variables that the block assigns once and reads in the same list of operations,
-    indices of its loops, and `loop_variables` (those of `loop_locals` if None). Arrays are never
-    local, nor is a variable that some block reads without that assignment.
+    These are `work.` variables that the block assigns once and reads only later in the same list of
+    operations, indices of its loops, and `loop_variables` (those of `loop_locals` if None). Arrays
+    are never local, nor is a variable that some block uses in any other way.
     """
     assigned_once = {name: _assigned_once(block) for name, block in program.blocks.items()}
     shared = {variable.name for variable in program.variables if variable.size}
@@ -107,10 +108,11 @@ def locals_of(
 
 
 def loop_locals(program: Program) -> dict[str, frozenset[str]]:
-    """Return for each block the local work variables that are assigned in its loops.
+    """Return for each block the local work variables that are assigned in a loop of some block.
 
     Such a variable is assigned before it is read in every block that uses it, and no block that it
-    runs uses it too. Arrays, loop indices and the interface of a step are excluded.
+    runs uses it too. Arrays, loop indices and STEP_INTERFACE are excluded. A block without any has
+    an empty set.
     """
     loops = [
         op for block in program.blocks.values() for op in walk_ops(block) if isinstance(op, Loop)

@@ -22,8 +22,9 @@ from language.ir.traversal import block_reads, block_writes
 def remove_dead_stores(program: Program, groups: tuple[str, ...]) -> Program:
     """Return a Program without assignments to variables in `groups` that nothing reads.
 
-    The pass repeats until no assignment is removed. Sources of outputs count as read. Assignments
-    inside branches, switches and loops stay.
+    `groups` are prefixes of names, like `work.`. The pass repeats until no assignment is removed.
+    Sources of outputs count as read. Assignments inside branches, switches and loops stay.
+    Variables without a remaining assignment are removed from the Program.
     """
     output_sources = {wire.source for wire in program.outputs}
     reads_by_block = {

@@ -31,7 +31,11 @@ NameSet = frozenset[str]
 
 
 def find_unassigned_reads(program: Program, entry: str, shared: frozenset[str]) -> frozenset[str]:
-    """Return the shared work variables that the block `entry` may read before it assigns them."""
+    """Return the shared work variables that the block `entry` may read before it assigns them.
+
+    Blocks that it runs are followed. For an array it is enough that one element that may be read is
+    unassigned.
+    """
     analysis = _AssignmentAnalysis(program, shared)
     analysis.analyse_block(program.blocks[entry], frozenset())
     return frozenset(analysis.unassigned_reads)

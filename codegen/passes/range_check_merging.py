@@ -51,9 +51,11 @@ LATCH_EACH = "latch_each"
 def merge_range_checks(program: Program, by_magnitude: bool = True) -> Program:
     """Return a Program that takes all inputs at once if all are within their ranges (rule C17).
 
-    With `by_magnitude` a range check becomes one comparison of a magnitude or of bits. Without it
-    the bounds stay visible to tools that propagate ranges through code. The block `latch` is merged
-    if it has at least two branches, each of which assigns one variable.
+    The block `latch` is merged if it has at least two operations, all of them branches whose then
+    part is one assignment; its old form becomes the block `latch_each`. In all blocks, `x - x >= 0`
+    becomes a range check and an enumeration loses its check `>= 0`. With `by_magnitude` a range
+    check also becomes one comparison (`fold_range_check`); without it the bounds stay visible to
+    tools that propagate ranges through code.
     """
     largest = MAX_FINITE[program.number_type]
     words = frozenset(variable.name for variable in program.variables if variable.values)
@@ -81,8 +83,9 @@ def merge_range_checks(program: Program, by_magnitude: bool = True) -> Program:
 def fold_range_check(expr: Expr) -> Expr:
     """Return `low <= x <= high` as one comparison if 0 is between the ends; also below `not`.
 
-    It becomes |x| <= high if the ends have equal magnitude, else `within`, which compares bits.
-    Both are false for a NaN, as before. Any other expression is returned as it is.
+    It becomes |x| <= high if low is -high, else a call of `within`, which compares bits. Both are
+    false for a NaN, as before. Any other expression is returned unchanged; operands are not
+    searched.
     """
     match expr:
         case Binary(

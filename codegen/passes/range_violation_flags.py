@@ -19,16 +19,20 @@ RANGE_VIOLATION_FLAG = "memory.left_{}"
 
 
 def ranged_signals(program: Program) -> tuple[str, ...]:
-    """Return the signals with a fault bit for their range, each once, in program order."""
+    """Return the signals that some operation sets a fault bit for, each once, in program order.
+
+    Fault bits without a signal are left out; the result may be empty.
+    """
     ops = (op for block in program.blocks.values() for op in walk_ops(block))
     found = (op.signal for op in ops if isinstance(op, FaultBit) and op.value)
     return tuple(dict.fromkeys(signal for signal in found if signal))
 
 
 def add_range_violation_flags(program: Program) -> Program:
-    """Return a Program with a truth variable for each signal that left its range; see the module.
+    """Return a Program with a truth variable for each of its `ranged_signals`.
 
-    A Program without such signals is returned as it is.
+    The variable `memory.left_<index>` is set to true after each operation that sets a fault bit of
+    that signal; nothing clears it. A Program without such signals is returned unchanged.
     """
     signals = ranged_signals(program)
     if not signals:
