@@ -45,8 +45,8 @@ def compute_kalman_gains(
     `r` (outputs,) holds the variances of v, `initial_covariance` (states, states) is the covariance
     before the first sample. The transient gains (transient_samples, states, outputs) are those of
     the first samples. The recursion goes on until the gain changes by less than STEADY_TOLERANCE,
-    or up to `max_samples`; the last gain (states, outputs) is the steady one. Returns None if a
-    gain exceeds all bounds. Raises MissingToolError, BuildError.
+    or up to `max_samples`; the last gain (states, outputs) is the steady one, also if it still
+    changes. Returns None if a gain exceeds all bounds. Raises MissingToolError, BuildError.
     """
     outputs, states = c.shape
     transient, steady = np.empty((transient_samples, states, outputs)), np.empty((states, outputs))

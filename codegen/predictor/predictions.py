@@ -61,7 +61,7 @@ class StackedPrediction:
     counts: Reals
 
     def split(self) -> tuple[Prediction, ...]:
-        """Return the result of each recording, with views of the stacked arrays."""
+        """Return the result of each recording in their order, with views of the stacked arrays."""
         stacked, edges = self.stacked, pairwise(self.starts.tolist())
         return tuple(
             Prediction(
