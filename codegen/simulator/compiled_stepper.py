@@ -86,40 +86,54 @@ class CompiledStepper:
             self.run(entry)
 
     def get(self, name: str) -> Any:
-        """Return the value of a variable or constant by name (`group.name`).
+        """Return the value of a variable or constant by its full name, like `state.w_em`.
 
-        All elements of an array.
+        A sequence for an array or table. Raises KeyError for an unknown name and for a local
+        variable of one function.
         """
         value = self._values.get(name)
         return self._arrays_and_constants[name] if value is None else value.value
 
     def set(self, name: str, value: float | int | bool) -> None:
-        """Set a scalar variable; a real is rounded to the number type."""
+        """Set a scalar variable or tunable constant; a real is rounded to the number type.
+
+        Raises KeyError for an array and an unknown name.
+        """
         self._values[name].value = value
 
     def has(self, name: str) -> bool:
-        """Tell whether the Program has a variable or constant with a name."""
+        """Tell whether `get` knows a name."""
         return name in self._values or name in self._arrays_and_constants
 
     def run(self, block: str) -> None:
-        """Run a block."""
+        """Run a block by name.
+
+        `default_page` is a block too: it sets the tunable constants to their defaults. Raises
+        KeyError for an unknown block.
+        """
         self._run(self._address, self._blocks[block])
 
     def snapshot(self) -> bytes:
-        """Return all values as bytes for `restore`."""
+        """Return all values, arrays included, as bytes for `restore`."""
         return self._buffer.raw
 
     def restore(self, values: bytes) -> None:
-        """Set all values to those of a `snapshot`."""
+        """Set all values to those of a `snapshot` of a stepper of the same Program."""
         ctypes.memmove(self._address, values, len(values))
 
     def make_reader(self, names: tuple[str, ...]) -> Callable[[], tuple[Any, ...]]:
-        """Return a function that returns the current values of the named variables."""
+        """Return a function that returns the values that the named scalars have when it is called.
+
+        Raises KeyError at once for an array and an unknown name.
+        """
         values = [self._values[name] for name in names]
         return lambda: tuple([value.value for value in values])
 
     def pop_range_violations(self) -> tuple[str, ...]:
-        """Return the signals that left their range since the last call, and clear their flags."""
+        """Return the signals that left their range since the last call, and clear their flags.
+
+        They are in the order of `ranged_signals`.
+        """
         violated = tuple(
             signal for signal, name in self._range_marks.items() if self._values[name].value
         )

@@ -33,7 +33,9 @@ def simulator_module_context(
 ) -> dict[str, Any]:
     """Return the context of the template of an instance's C.
 
-    `flow` is the index of the instance among all instances.
+    It extends `module_context` with what the code around the blocks needs: defaults, monitored
+    ranges, invariants, slots of the row, events. `flow` is not used: the result holds under this
+    key the index of the instance among the continuous ones, -1 for a sampled one.
     """
     usage_by_block = block_usages(program, locals_of(program))
     c_names = CNames(program)
@@ -83,8 +85,8 @@ def simd_batch_of(
 ) -> dict[str, Any] | None:
     """Return the template context of SIMD steps over several variants of an instance.
 
-    Returns None for a sampled automaton, for inputs that vary inside a step, for a sensor with a
-    lag, and for a Program that cannot be vectorised.
+    Returns None for a sampled automaton, for inputs that vary inside a step, if a sensor with a lag
+    measures the instance, and for a Program that `simd_batch_context` does not vectorise.
     """
     if (
         program.period is not None
@@ -167,7 +169,11 @@ def _range_contexts(program: Program, number: int) -> list[dict[str, object]]:
 def varying_inputs(
     assembly: SimulationAssembly, name: str, program: Program, signal_names: SignalNameMap
 ) -> list[dict[str, str]]:
-    """Return the inputs of an instance that vary inside its steps, with their C text at a time."""
+    """Return the inputs of an instance that vary inside its steps, with their C text at a time.
+
+    They are those whose Program has a variable `work.rise_<input>`, as `name` and `at`, in the
+    order of the connections.
+    """
     timed = dataclasses.replace(signal_names, is_timed=True)
     known = {variable.name for variable in program.variables}
     inputs = []

@@ -38,7 +38,7 @@ class SignalNameMap:
         return self.emit_signal(signal)
 
     def integer_constant(self, name: str, number: int) -> str:
-        """Return a whole number that stands beside a signal, as a decimal."""
+        """Return a whole number that stands beside a signal, as a decimal; `name` is ignored."""
         return repr(number)
 
     def is_unsigned(self, name: str) -> bool:
@@ -46,7 +46,11 @@ class SignalNameMap:
         return False
 
     def emit_signal(self, name: str) -> str:
-        """Return the C text of an input, a sensor value or an output of an instance."""
+        """Return the C text of an input, a sensor value or an output `instance.signal`.
+
+        With `is_timed` an input with a trajectory is evaluated at the variable `time`. `is_row` has
+        no effect here. Raises KeyError for an unknown name.
+        """
         courses = [course.name for course in self.assembly.input_trajectories]
         if self.is_timed and name in courses:
             return f"course_{courses.index(name)}(run, time)"
@@ -60,12 +64,15 @@ class SignalNameMap:
         return place.replace("self->", f"(double)run->{program.name}.self.")
 
     def emit_formula(self, block: str) -> str:
-        """Return the C text of the formula of a connection."""
+        """Return the C text of the formula of a connection, a block of `assembly.wires`."""
         return emit_wire_formula(self.assembly, block, self)
 
 
 def emit_wire_formula(assembly: SimulationAssembly, block: str, c_names: CNameMap) -> str:
-    """Return the C text of a formula, a block of `assembly.wires`, as a double."""
+    """Return the C text of a formula as a double; `block` is a block of `assembly.wires`.
+
+    `c_names` gives the C text of its names. The block is one assignment.
+    """
     (op,) = assembly.wires.blocks[block]
     assert isinstance(op, Assign)
     return f"(double)({emit_expression(op.value, c_names)})"
@@ -82,7 +89,7 @@ class TimeNameMap:
         return "now"
 
     def integer_constant(self, name: str, number: int) -> str:
-        """Return a whole number that stands beside the time, as a decimal."""
+        """Return a whole number that stands beside the time, as a decimal; `name` is ignored."""
         return repr(number)
 
     def is_unsigned(self, name: str) -> bool:
@@ -91,9 +98,10 @@ class TimeNameMap:
 
 
 def column_positions(assembly: SimulationAssembly) -> list[int]:
-    """Return the position of each recorded column in a row.
+    """Return the position of each recorded column in a row, in the order of the columns.
 
-    Columns with a formula follow the signals.
+    A column with a formula has its own position after all signals of the row; any other one has
+    that of its signal.
     """
     positions, formulas = [], len(assembly.row_signals)
     for column in assembly.columns:
@@ -106,5 +114,8 @@ def column_positions(assembly: SimulationAssembly) -> list[int]:
 
 
 def row_width(assembly: SimulationAssembly) -> int:
-    """Return the number of values in a row, at least 1."""
+    """Return the number of values in a row, at least 1.
+
+    These are the signals of the row, then the recorded columns with a formula.
+    """
     return max(1, len(assembly.row_signals) + sum(1 for c in assembly.columns if c.block))

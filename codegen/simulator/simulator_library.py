@@ -125,8 +125,8 @@ class SimulatorLibrary:
         """Return a function that runs the variants from a first index up to a last one, exclusive.
 
         `plan` is a plan of the engine (engine/batch/run_plan.py). `variants` gives the members of
-        the C structure `Variants`: whole numbers, contiguous arrays, or lists of arrays. Results
-        are written into these arrays.
+        the C structure `Variants`: whole numbers, contiguous arrays, or lists of arrays and None.
+        Results are written into these arrays, which the function keeps alive.
         """
         struct, keep_alive = self._pack_plan(plan)
         members = VariantsStruct()
@@ -202,8 +202,9 @@ def load_library(
 ) -> SimulatorLibrary:
     """Return the loaded simulation of an assembly, compiled if it is not in the cache.
 
-    Without `simd_batch` it has no SIMD steps over variants and compiles faster; a single run needs
-    none. Raises MissingToolError, BuildError.
+    In a process, equal arguments (an assembly by its digest) give the same object, up to 64 of
+    them. Without `simd_batch` it has no SIMD steps over variants and compiles faster; a single run
+    needs none. Raises MissingToolError, BuildError.
     """
     parts = (*find_compiler(compiler_name), *flags)
     library_key = _LibraryKey(assembly.digest(), parts, cache_folder(), simd_batch, assembly)
@@ -232,7 +233,12 @@ def _load_cached(
 def build_library(
     sources: Sequence[Path], target: Path, flags: Sequence[str], compiler_name: str | None
 ) -> None:
-    """Compile the sources in parallel and link them to a shared library. Raises BuildError."""
+    """Compile the sources in parallel and link them to the shared library `target`.
+
+    Objects are written beside the sources; those of shared sources (`is_shared`) come from the
+    cache. Raises BuildError with the compiler's message, MissingToolError;
+    subprocess.TimeoutExpired after TIMEOUT seconds.
+    """
     command = find_compiler(compiler_name)
     compile_command = [*command, *flags, "-fPIC"]
     version, room = compiler_version(compiler_name), sources[0].parent / "objects"
