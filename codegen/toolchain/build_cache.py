@@ -37,7 +37,11 @@ log = logging.getLogger("modewright.cache")
 
 
 def cache_folder() -> Path:
-    """Return the folder of the cache: $MODEWRIGHT_CACHE, else one in the user's cache folder."""
+    """Return the folder of the cache: $MODEWRIGHT_CACHE, else the user's default.
+
+    The latter is `modewright` in $XDG_CACHE_HOME if that is an absolute path, else in `~/.cache`.
+    Nothing is created. Raises RuntimeError without a home folder.
+    """
     if given := os.environ.get(CACHE_VARIABLE):
         return Path(given)
     base = os.environ.get("XDG_CACHE_HOME", "")
@@ -47,7 +51,8 @@ def cache_folder() -> Path:
 def cache_fault(folder: Path) -> str:
     """Return the reason why a folder must not be used as a cache; an empty text if it may.
 
-    The folder is created if it does not exist.
+    It must be a folder (no link) of the user, writable, and closed to others. It is created with
+    mode 0700, with its parents, if it does not exist. Raises nothing.
     """
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -66,9 +71,9 @@ def cache_fault(folder: Path) -> str:
 
 
 def cache_subfolder(subfolder: str) -> Path | None:
-    """Return a folder inside the cache for other contents than programs.
+    """Return a folder inside the cache for other contents than programs, created if it is missing.
 
-    Returns None if it cannot be used.
+    Returns None if the cache or the folder cannot be used (`cache_fault`).
     """
     folder, fault = _locate_folder(subfolder)
     return None if fault else folder
@@ -93,9 +98,10 @@ def key_of(
     version: str,
     dependencies: Iterable[Path] | None = None,
 ) -> str:
-    """Return the key of a program: the digest of its sources, its compiler command and version.
+    """Return the key of a program: a SHA-256 of its sources, compiler command and version, in hex.
 
-    The digest covers all files below the folder of the first source, or only `dependencies`.
+    The digest covers the names of the sources, and name and contents of all files below the folder
+    of the first source, or only of `dependencies`, which are in that folder.
     """
     digest = hashlib.sha256()
     for text in (*command, version, *(path.name for path in sources)):
@@ -113,8 +119,10 @@ def get_or_build(
 ) -> Path:
     """Return the path of the program with a key, built by `build` if it is not in the cache.
 
-    `build` writes to the path that it is given. If the cache cannot be used, the program is in
-    `fallback_folder`, and a warning is logged. `subfolder` is a folder inside the cache.
+    `build` writes to the path that it is given, `program` in `fallback_folder`; its errors pass. A
+    cached program is used if it belongs to the user, is executable and has its digest. If the cache
+    cannot be used, the program stays in `fallback_folder`, and a warning is logged. `subfolder` is
+    a folder inside the cache. Storing a program removes old ones.
     """
     folder, fault = _locate_folder(subfolder)
     if fault:
@@ -174,11 +182,11 @@ def _digest_file(target: Path) -> Path:
 
 
 def remove_old_programs(folder: Path) -> None:
-    """Remove the oldest programs of a folder and of its subfolders, at most once an hour.
+    """Remove the oldest programs of a folder and of its subfolders, at most once an hour each.
 
     The MAX_PROGRAMS programs that were used last stay, as do those used within a day. A program is
     removed together with all files whose names begin with its key. The time of use is the later of
-    the access and modification times.
+    the access and modification times. Writes the file CLEANUP_STAMP. Raises OSError.
     """
     stamp = folder / CLEANUP_STAMP
     with suppress(OSError):

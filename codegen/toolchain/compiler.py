@@ -47,7 +47,8 @@ class BuildError(Exception):
 def find_compiler(name: str | None = None) -> list[str]:
     """Return the command of the C compiler: `name`, else $CC, else the first of cc, gcc and clang.
 
-    Raises MissingToolError if it is not installed.
+    `name` and $CC are split into words like a shell command. Raises MissingToolError if the first
+    word is not an installed program.
     """
     requested = shlex.split(name or os.environ.get("CC", ""))
     for candidate in [requested] if requested else [["cc"], ["gcc"], ["clang"]]:
@@ -60,14 +61,15 @@ def find_compiler(name: str | None = None) -> list[str]:
 
 
 def flags_at_level(level: str) -> tuple[str, ...]:
-    """Return FLAGS with another optimisation level, for example `O3`."""
+    """Return FLAGS with another optimisation level instead of -O2, for example `O3`."""
     return tuple(f"-{level}" if flag == "-O2" else flag for flag in FLAGS)
 
 
 def compiler_version(name: str | None = None) -> str:
-    """Return the path of the compiler and the first line of its version.
+    """Return `path: line`: the resolved path of the compiler, the first line of its version text.
 
-    Raises MissingToolError; BuildError if it does not run.
+    The exit code is ignored. `name` is that of `find_compiler`. Raises MissingToolError; BuildError
+    if it cannot be started or does not end in TIMEOUT seconds.
     """
     command = find_compiler(name)
     try:
@@ -86,9 +88,9 @@ def compile_program(
     flags: Sequence[str] = FLAGS,
     compiler_name: str | None = None,
 ) -> None:
-    """Compile sources with all warnings into an executable or a library, according to `flags`.
+    """Compile sources with WARNINGS into an executable or a library, according to `flags`.
 
-    Raises MissingToolError, BuildError.
+    Warnings are no errors. Raises MissingToolError, BuildError.
     """
     run_compiler(
         [*find_compiler(compiler_name), *flags, *WARNINGS, *map(str, sources), "-lm"], target
@@ -96,9 +98,10 @@ def compile_program(
 
 
 def run_compiler(command: Sequence[str], target: Path) -> None:
-    """Run a compiler command with `-o target`.
+    """Run a compiler command with `-o target` appended.
 
-    Raises BuildError with its output from the first error on.
+    Raises BuildError for a nonzero exit code, with its output from the first error on, and after
+    TIMEOUT seconds. Warnings are dropped.
     """
     try:
         done = subprocess.run(
@@ -113,7 +116,7 @@ def run_compiler(command: Sequence[str], target: Path) -> None:
 def run_executable(
     target: Path, records: bytes, extra_environment: Mapping[str, str] | None = None
 ) -> bytes:
-    """Run an executable on input records and return its output.
+    """Run an executable with input records as its standard input; return its standard output.
 
     `extra_environment` is added to the environment. Raises BuildError for a nonzero exit code and
     after TIMEOUT seconds.
@@ -140,7 +143,8 @@ def _first_error(text: str) -> str:
 def has_gcc_vectors() -> bool:
     """Tell whether the compiler is GCC for x86-64, whose vector extensions SIMD code uses.
 
-    Raises MissingToolError.
+    False for clang and for a compiler that does not run. The answer is cached by command. Raises
+    MissingToolError.
     """
     return _has_gcc_vectors(tuple(find_compiler()))
 

@@ -35,9 +35,9 @@ DEBIAN_PACKAGES: Mapping[str, str] = {
 
 
 def require_tool(tool: str) -> str:
-    """Return the name of a tool if it is installed.
+    """Return the name of a tool if it is on the path.
 
-    Raises MissingToolError with its package otherwise.
+    Raises MissingToolError otherwise, with its package from DEBIAN_PACKAGES or its own name.
     """
     if shutil.which(tool) is None:
         package = DEBIAN_PACKAGES.get(tool, tool)
@@ -50,8 +50,8 @@ def run_tool(
 ) -> subprocess.CompletedProcess[str]:
     """Run a tool in a folder and return the completed process, whatever its exit code.
 
-    `extra_environment` is added to the environment. Raises MissingToolError; BuildError after
-    TOOL_TIMEOUT seconds.
+    Its output is captured as text. `extra_environment` is added to the environment. Raises
+    MissingToolError; BuildError after TOOL_TIMEOUT seconds.
     """
     tool, *words = command
     try:
@@ -74,7 +74,7 @@ def output_of(
     """Return the standard output of a tool that is run in a folder.
 
     `extra_environment` is added to the environment. Raises MissingToolError; BuildError with its
-    error output for a nonzero exit code.
+    error output for a nonzero exit code, and after TOOL_TIMEOUT seconds.
     """
     done = run_tool(command, folder, extra_environment)
     if done.returncode:

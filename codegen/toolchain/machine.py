@@ -48,7 +48,7 @@ class Machine:
 
 
 def harness_file(name: str) -> Path:
-    """Return the path of a file of the harness."""
+    """Return the path of a file of the harness, in codegen/targets; it need not exist."""
     return Path(str(resources.files("codegen"))) / "targets" / name
 
 
@@ -60,7 +60,9 @@ def _find_cross_compiler(name: str | None) -> list[str]:
 def run_in_qemu(target: Path, records: bytes, options: Sequence[str] = ()) -> bytes:
     """Run a program for a Cortex-M4F in QEMU on input records and return its output.
 
-    Raises MissingToolError; BuildError for a nonzero exit code and after TIMEOUT seconds.
+    Both are files in a temporary folder, `records.in` and `records.out`, that the program opens.
+    `options` are passed to QEMU. Raises MissingToolError; BuildError for a nonzero exit code (with
+    its meaning in HARNESS_EXIT_CODES) and after TIMEOUT seconds.
     """
     emulator = require_tool(EMULATOR)
     semihosting = ("-semihosting-config", "enable=on,target=native")

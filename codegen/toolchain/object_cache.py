@@ -18,7 +18,10 @@ ha_math reads its own header only."""
 
 
 def is_shared(source: Path) -> bool:
-    """Tell whether a source is the same in many programs."""
+    """Tell whether a source is the same in many programs.
+
+    These are ha_math.c, ha_mathf.c and C files in a folder `harness`.
+    """
     return SHARED_SOURCES.search(source.as_posix()) is not None
 
 
@@ -26,7 +29,7 @@ def object_of(source: Path, command: Sequence[str], version: str, folder: Path) 
     """Return the object file of a shared source, from the cache if it was compiled before.
 
     `command` is the compiler with its flags, `version` its version. If the cache cannot be used,
-    the object is in `folder`. Raises BuildError.
+    the object is in a folder below `folder`, which is created. Raises BuildError.
     """
     read = None if source.parent.name == "harness" else [source, source.with_suffix(".h")]
     key = key_of([source], [*command, "-c"], version, read)
@@ -41,5 +44,8 @@ def object_of(source: Path, command: Sequence[str], version: str, folder: Path) 
 def substitute_objects(
     sources: Sequence[Path], command: Sequence[str], version: str, folder: Path
 ) -> list[Path]:
-    """Return the sources, with each shared one replaced by its object file. Raises BuildError."""
+    """Return the sources in their order, with each shared one replaced by its object file.
+
+    Arguments are those of `object_of`. Raises BuildError.
+    """
     return [object_of(s, command, version, folder) if is_shared(s) else s for s in sources]

@@ -21,23 +21,29 @@ TEMPLATE_CACHE = "templates"
 
 
 def render(template: str, context: Mapping[str, Any]) -> str:
-    """Return a rendered template of C; a variable without a value is an error (rule C25)."""
+    """Return a rendered template of codegen/templates, without HTML escapes.
+
+    `template` is its path in that folder. A variable without a value raises jinja2.UndefinedError
+    (rule C25).
+    """
     return template_environment((CODEGEN,), is_html=False).get_template(template).render(context)
 
 
 def render_html(packages: tuple[str, ...], template: str, context: Mapping[str, Any]) -> str:
     """Return a rendered HTML page, with the values of the context escaped.
 
-    The template and the templates that it includes are in the folders `templates` of the packages.
+    The template and the templates that it includes are in the folders `templates` of the packages,
+    searched in that order. A variable without a value raises jinja2.UndefinedError.
     """
     return template_environment(packages, is_html=True).get_template(template).render(context)
 
 
 @cache
 def template_environment(packages: tuple[str, ...], is_html: bool) -> jinja2.Environment:
-    """Return the Jinja environment of the templates of packages.
+    """Return the Jinja environment of the templates of packages; one for each pair of arguments.
 
-    A variable without a value is an error. Compiled templates are cached on disk.
+    A variable without a value is an error. Values are escaped if `is_html`. Compiled templates are
+    cached on disk if the cache can be used.
     """
     return jinja2.Environment(
         loader=jinja2.ChoiceLoader([jinja2.PackageLoader(package) for package in packages]),
@@ -72,5 +78,5 @@ def _template_cache() -> jinja2.BytecodeCache | None:
 
 
 def product_version() -> str:
-    """Return the version of the product."""
+    """Return the version of the installed package `modewright`."""
     return metadata.version("modewright")

@@ -29,7 +29,11 @@ class ToolVerdict:
 
 
 def tool_version(tool: str, folder: Path) -> str:
-    """Return the first word of a tool's version text that begins with a digit, else ""."""
+    """Return the first word of a tool's version text that begins with a digit, else an empty text.
+
+    Parentheses around it are removed. The option is --version, -version for frama-c. Raises
+    MissingToolError, BuildError.
+    """
     words = run_tool(
         [tool, "--version" if tool != "frama-c" else "-version"], folder
     ).stdout.split()
