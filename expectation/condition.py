@@ -80,7 +80,8 @@ class ConditionReader:
     def read_condition(self, scalar: ScalarNode, formula: Formula) -> Condition | None:
         """Return the condition of an expression that is true or false.
 
-        Return None if a problem was reported.
+        `scalar` gives its text, `formula` its syntax tree. Returns None if a problem was reported:
+        an unknown name, a wrong type, or a quantity instead of a truth value.
         """
         return self._read(scalar.text, formula.tree, formula.key, truth=True)
 
@@ -119,10 +120,11 @@ class ConditionReader:
         )
 
     def full_name(self, name: str) -> str:
-        """Return the full name of a signal.
+        """Return the full name of a signal, `instance.signal`.
 
-        A signal of a single instance gets its prefix; an output that is a mode signal is replaced
-        by its source.
+        In a system with a single instance, a name without a dot gets its prefix if that is a
+        signal. An output of the system that is a mode signal is replaced by its source. Any other
+        name, known or not, is returned unchanged.
         """
         alone = self.system.sole_instance
         if alone and "." not in name and f"{alone}.{name}" in {**self.kinds, **self.regions}:
@@ -131,7 +133,10 @@ class ConditionReader:
         return output if isinstance(output, str) and output in self.regions else name
 
     def read_operand(self, text: str, tree: SyntaxTree, truth: bool) -> Condition | None:
-        """Return the operand of a running statistic; None if a problem was reported."""
+        """Return the operand of a running statistic; None if a problem was reported.
+
+        With `truth` it must be true or false, else a quantity. `text` is the name of the statistic.
+        """
         return self._read(text, tree, "running", truth)
 
 

@@ -52,11 +52,19 @@ class Coverage:
         return tuple(mode.key for mode in self.automaton.all_modes if is_mode_key(mode.key))
 
     def condition_coverage(self, decision: Decision) -> tuple[ConditionCoverage, ...]:
-        """Return the MC/DC coverage of each condition of a decision."""
+        """Return the MC/DC coverage of each condition of a decision, in their order.
+
+        A decision without observed combinations counts as never evaluated.
+        """
         return decision.condition_coverage(self.combinations.get(decision.key, frozenset()))
 
     def count(self) -> dict[str, tuple[int, int]]:
-        """Return (reached, total) of modes, transitions, outcomes of guards and conditions."""
+        """Return (reached, total) of modes, transitions, outcomes and conditions.
+
+        The keys are `modes`, `transitions`, `outcomes` and `conditions`. Outcomes are those of
+        guards: a decision has two, without conditions one. A condition is reached if its coverage
+        is one of COVERED.
+        """
         outcomes = [d.outcomes(self.combinations.get(d.key, frozenset())) for d in self.decisions]
         conditions = [each for d in self.decisions for each in self.condition_coverage(d)]
         return {
@@ -67,7 +75,11 @@ class Coverage:
         }
 
     def list_missed(self) -> list[str]:
-        """Return one line for each mode, transition and condition that is not covered."""
+        """Return one line of text for each mode, transition and condition that is not covered.
+
+        Modes come first, then the decisions in their order. A decision that was never read or is
+        not measured has one line for all its conditions.
+        """
         lines = [
             f"mode `{'.'.join(names_of(key.removeprefix(f'regions.{CHART}.')))}` was not entered"
             for key in self.all_modes
@@ -96,7 +108,11 @@ class Coverage:
 
 
 def measure_coverage(test: Test) -> list[Coverage]:
-    """Return the coverage of each instance in a test, from a run of the interpreter."""
+    """Return the coverage of each instance in a test, in the order of the instances.
+
+    The scenario of the test is simulated once by the interpreter, with instrumented Programs. Modes
+    include those that were active within a tick only. Expectations are not evaluated.
+    """
     scenario = resolve_recording(test.system, test.scenario)
     decisions, programs, arrays = instrument_programs(automata_of(test.system, scenario))
     steppers: dict[int, _CoverageInterpreter] = {}
@@ -137,12 +153,15 @@ def _entered_modes(automaton: Automaton, active: Collection[tuple[str, int]]) ->
 
 
 def is_mode_key(key: str) -> bool:
-    """Return whether a key path denotes a mode, and not a region."""
+    """Tell whether a key path denotes a mode: the part before its last one is `modes`."""
     return key.split(".")[-2:-1] == ["modes"]
 
 
 def names_of(key: str) -> tuple[str, ...]:
-    """Return the names in a key path: `modes.a.transitions.b` gives ("a", "b")."""
+    """Return the names in a key path: `modes.a.transitions.b` gives ("a", "b").
+
+    All parts equal to one of STRUCTURE_KEYS are left out.
+    """
     return tuple(part for part in key.split(".") if part not in STRUCTURE_KEYS)
 
 
@@ -151,7 +170,9 @@ def instrument_programs(
 ) -> tuple[dict[str, tuple[Decision, ...]], dict[str, Program], dict[str, Mapping[str, str]]]:
     """Return decisions, instrumented Programs and arrays of combinations, each by instance.
 
-    `automata` holds each instance's automaton and the names of its varying parameters.
+    `automata` holds each instance's automaton and the names of its varying parameters. Decisions
+    are those of all transitions, mode by mode. The arrays are names of variables by key path of the
+    decision; a decision with too many conditions has none.
     """
     decisions, programs, arrays = {}, {}, {}
     for name, (automaton, varying) in automata.items():
@@ -163,8 +184,9 @@ def instrument_programs(
 
 
 def merge_coverages(parts: Iterable[Coverage]) -> list[Coverage]:
-    """Return the union of coverages, one for each automaton name, in the order of first
-    occurrence.
+    """Return the union of coverages, one for each automaton name, in order of first occurrence.
+
+    Decisions and `unmeasured` are those of the first part with that name.
     """
     merged: dict[str, Coverage] = {}
     for part in parts:

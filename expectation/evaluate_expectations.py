@@ -39,7 +39,12 @@ class Outcome:
 
 
 def evaluate_test(test: Test, trajectory: Trajectory) -> tuple[Outcome, ...]:
-    """Return the outcomes of all expectations of a test, in their order."""
+    """Return the outcomes of all expectations of a test, in their order.
+
+    An expectation with a trigger fails if the trigger never occurs, one with a time if the run
+    ended before it. Conditions of signals are evaluated at recorded rows only. `time` and `message`
+    of a failure tell where and why; a passed one has an empty message.
+    """
     run = observe_run(test.system, trajectory)
     return tuple(_ExpectationEvaluator(each, run).evaluate() for each in test.expectations)
 

@@ -65,9 +65,9 @@ class Condition:
 
     @property
     def all_signals(self) -> tuple[str, ...]:
-        """The signals to which the expression and its running statistics refer.
+        """The signals to which the expression and its running statistics refer, each once.
 
-        A condition without signals is known between rows, too.
+        Fault words are included. A condition without signals is known between rows, too.
         """
         found = dict.fromkeys([*self.signals, *(flag.signal for flag in self.flags.values())])
         for running in self.running.values():
@@ -114,7 +114,7 @@ class Expectation:
 
     @property
     def conditions(self) -> tuple[Condition, ...]:
-        """The conditions that the evaluation needs: subject and trigger."""
+        """The conditions among subject and trigger (`when.after`), in this order; possibly none."""
         found = (self.subject, self.when.after)
         return tuple(part for part in found if isinstance(part, Condition))
 

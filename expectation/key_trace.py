@@ -45,8 +45,10 @@ def build_key_traces(
 ) -> KeyTraces:
     """Return the lines of C that cite each key; `code` is C text by automaton and file name.
 
-    A citation of a part of a key belongs to the smallest enclosing key. A citation of a mode that
-    is `like` a template belongs to the key of the template if that is smaller.
+    Keys are the entries of KEYED_SECTIONS, also nested ones and those of templates. A citation of a
+    part of a key belongs to the smallest enclosing key. A citation of a mode that is `like` a
+    template belongs to the key of the template if that is smaller. A citation without any such key
+    is in `unmatched_citations`, as `automaton path`.
     """
     spans = {
         (document.name, path): span

@@ -52,11 +52,16 @@ class Decision:
         return _evaluate(self.structure, combination)
 
     def condition_coverage(self, combinations: Collection[int]) -> tuple[ConditionCoverage, ...]:
-        """Return the coverage of each condition by the observed combinations."""
+        """Return the coverage of each condition by the observed combinations.
+
+        The first that applies: `unique cause` (two combinations differ in this condition only and
+        in the outcome), `masking`, `always true` or `always false`, `not shown`. Without
+        combinations it is `always false`.
+        """
         return tuple(self._coverage_of(1 << k, combinations) for k in range(len(self.conditions)))
 
     def outcomes(self, combinations: Collection[int]) -> frozenset[bool]:
-        """Return the values of the guard over the combinations."""
+        """Return the different values of the guard over the combinations; empty without any."""
         return frozenset(self.outcome(combination) for combination in combinations)
 
     def _coverage_of(self, bit: int, combinations: Collection[int]) -> ConditionCoverage:
@@ -79,7 +84,12 @@ class Decision:
 
 
 def decision_of(transition: Transition) -> Decision:
-    """Return the decision of a transition: any of its events, and its guard."""
+    """Return the decision of a transition: any of its events, and its guard.
+
+    The conditions are `event <name>` for each event, then the operands of `and`, `or` and `not` in
+    the guard as texts; equal ones count once. The literal true beside events is left out. The
+    completion of a superstate is the single condition `completion`.
+    """
     if transition.is_completion:
         return Decision(transition.key, ("completion",), 0)
     conditions: list[SyntaxTree] = []
@@ -110,7 +120,10 @@ def decision_of(transition: Transition) -> Decision:
 
 
 def any_of(count: int) -> DecisionStructure:
-    """Return the structure `or` of the first `count` conditions."""
+    """Return the structure `or` of the conditions 0 to count - 1.
+
+    For a count below 2 it is condition 0.
+    """
     structure: DecisionStructure = 0
     for place in range(1, count):
         structure = ("or", structure, place)
@@ -120,7 +133,8 @@ def any_of(count: int) -> DecisionStructure:
 def match_conditions(structure: DecisionStructure, expr: Expr) -> dict[int, Expr] | None:
     """Return the lowered expression of each condition by index; None if the structures differ.
 
-    A condition may be lowered to any expression, e.g. `rising(x)` to `x and not previous`.
+    A condition may be lowered to any expression, e.g. `rising(x)` to `x and not previous`; a
+    constant matches anything. Of several occurrences of a condition the first one is taken.
     """
     match structure, expr:
         case bool(), _:

@@ -15,9 +15,11 @@ from language.text.diagnostic import Problems, Span, suggest_name
 
 
 def mode_predicates(system: System) -> dict[str, ModePredicate]:
-    """Return the predicate of each mode by `instance.mode`.
+    """Return the predicate of each mode and superstate by `instance.mode`.
 
-    A single instance needs no prefix; modes of the main region also have the name of the region.
+    A mode of a parallel region is `instance.region.mode`; one of the main region also has that
+    form, unless the name is taken. In a system with a single instance, all paths are known without
+    it too.
     """
     found: dict[str, ModePredicate] = {}
     for name, instance in system.instances.items():
@@ -32,7 +34,10 @@ def mode_predicates(system: System) -> dict[str, ModePredicate]:
 
 
 def leaf_modes_by_path(automaton: Automaton) -> dict[tuple[str, str], frozenset[str]]:
-    """Return the leaf modes inside each mode and superstate, by region and path."""
+    """Return the leaf modes inside each mode and superstate, by region and `path_of_mode`.
+
+    A leaf mode has only itself.
+    """
     found: dict[tuple[str, str], frozenset[str]] = {}
     for region in automaton.all_regions:
         for mode in region.modes.values():
@@ -46,7 +51,7 @@ def leaf_modes_by_path(automaton: Automaton) -> dict[tuple[str, str], frozenset[
 
 
 def path_of_mode(region: str, mode: str) -> str:
-    """Return the path of a mode: its name, preceded by the region unless that is the main one."""
+    """Return the path of a mode: its name in the main region (CHART), else `region.mode`."""
     return mode if region == CHART else f"{region}.{mode}"
 
 
@@ -57,7 +62,11 @@ def format_region(region_ref: RegionRef) -> str:
 
 
 def suggest_mode(name: str, region_ref: RegionRef, system: System) -> str:
-    """Return a hint with the mode of a region that the name probably means; may be empty."""
+    """Return a hint with the mode of a region that the name probably means; may be empty.
+
+    Prefixes of the instance and region are ignored. A mode with that name comes first, then the
+    first one whose last part it is, then the most similar one (`suggest_name`).
+    """
     instance, region = region_ref
     own = "" if region == CHART else f"{region}."
     paths = leaf_modes_by_path(system.instances[instance].automaton)
@@ -70,27 +79,38 @@ def suggest_mode(name: str, region_ref: RegionRef, system: System) -> str:
 
 
 def suggest_path(name: str, known: Iterable[str]) -> str:
-    """Return a hint with the shortest path that ends with the name, else the most similar one."""
+    """Return a hint with the shortest known path that ends with `.` and the name.
+
+    Otherwise the hint is that of `suggest_name`, which may be empty.
+    """
     known = list(known)
     ends = [path for path in known if path.endswith(f".{name}")]
     return f"did you mean `{min(ends, key=len)}`?" if ends else suggest_name(name, known)
 
 
 def leaf_modes_entered(system: System, event: ModeEntryEvent) -> frozenset[str]:
-    """Return the leaf modes inside the mode that an event enters."""
+    """Return the names of the leaf modes inside the target mode of an event.
+
+    Raises KeyError for an unknown instance or mode.
+    """
     automaton = system.instances[event.instance].automaton
     return leaf_modes_by_path(automaton)[event.region, path_of_mode(event.region, event.target)]
 
 
 def is_chart(system: System, instance: str) -> bool:
-    """Return whether the automaton of an instance is a chart (nested modes or several
-    micro-steps).
+    """Tell whether the automaton of an instance is a chart.
+
+    A chart has nested modes or several micro-steps: its `statechart` is not None.
     """
     return system.instances[instance].automaton.statechart is not None
 
 
 def mode_signals(system: System, instance: str) -> dict[str, RegionRef]:
-    """Return the regions of an instance by the signal that holds their mode."""
+    """Return the regions of an instance by the signal that holds their mode.
+
+    The signal is `instance.mode` for the main region, else `instance.<region>` with underscores for
+    dots. It need not be an output.
+    """
     found = {}
     for region in system.instances[instance].automaton.all_regions:
         signal = "mode" if region.name == CHART else region.name.replace(".", "_")
@@ -101,7 +121,8 @@ def mode_signals(system: System, instance: str) -> dict[str, RegionRef]:
 def fault_words(system: System) -> dict[str, str]:
     """Return the instances by the signals that hold their fault words.
 
-    Signals of instances come before outputs of the system.
+    These are outputs `instance.output` whose source is `faults`, then outputs of the system that
+    are such a signal. An instance without such an output is absent.
     """
     found = {
         f"{name}.{output}": name
@@ -114,7 +135,10 @@ def fault_words(system: System) -> dict[str, str]:
 
 
 def fault_bits(system: System, instance: str) -> dict[str, int]:
-    """Return the bit of each fault of an instance; empty if it is not sampled or does not exist."""
+    """Return the index of the bit of each fault of an instance, by name, in the order of the bits.
+
+    Empty if the instance is not sampled or does not exist.
+    """
     found = system.instances.get(instance)
     return _fault_bits_of(found.automaton) if found and found.automaton.is_sampled else {}
 
@@ -126,7 +150,7 @@ def _fault_bits_of(automaton: Automaton) -> dict[str, int]:
 
 
 def require_mode_output(system: System, instance: str, at: Span, problems: Problems) -> None:
-    """Report a chart that does not have its mode as an output."""
+    """Report an error `missing` at a place for a chart that does not have `mode` as an output."""
     outputs = system.instances[instance].automaton.outputs
     if is_chart(system, instance) and "mode" not in outputs:
         label = f"`{instance}` is a chart: its modes are known by its output `mode`"
@@ -136,7 +160,8 @@ def require_mode_output(system: System, instance: str, at: Span, problems: Probl
 def suggest_output(system: System, name: str) -> str:
     """Return the hint to make an internal variable of an instance an output.
 
-    The result is empty if it has none.
+    `name` is `instance.variable`, or `variable` with a single instance. The result is empty unless
+    it is a state, an equation of some mode or the `faults` of a sampled instance.
     """
     head, _, own = name.rpartition(".")
     instance = system.instances.get(head or system.sole_instance or "")

@@ -60,7 +60,8 @@ class ObservedRun:
     def modes_at(self, point: int) -> dict[str, str]:
         """Return the active modes at a point by `instance` or `instance.region`.
 
-        The implicit mode of an automaton without modes is left out.
+        `point` is an index of `points`. The implicit mode of an automaton without modes is left
+        out.
         """
         return {
             format_region(place): found[point]
@@ -71,7 +72,9 @@ class ObservedRun:
     def times_of(self, event: ModeEntryEvent) -> list[float]:
         """Return the times [s] of an event in ascending order.
 
-        In a chart a mode is also entered if a recorded row finds it active after it was inactive.
+        An event without a source is the entry of its target from any mode. In a chart such an event
+        also occurs at a point at which a leaf mode inside the target becomes active; equal times
+        count once.
         """
         is_tree = is_chart(self.system, event.instance)
         names = (event.source, event.target)
@@ -101,7 +104,11 @@ class ObservedRun:
         return found
 
     def mode_entries(self, region_ref: RegionRef, since: int) -> list[tuple[int, str]]:
-        """Return (point, mode) for each entry of a mode in a region after the point `since`."""
+        """Return (point, mode) for each entry of a mode in a region after the point `since`.
+
+        `since` is an index of `points`. A transition to the same mode counts too, but not in a
+        chart.
+        """
         modes = self.modes[region_ref]
         is_tree = is_chart(self.system, region_ref[0])
         return [
@@ -120,7 +127,12 @@ class Series:
 
 
 def observe_run(system: System, trajectory: Trajectory) -> ObservedRun:
-    """Return the observation of a trajectory; the modes of charts come from recorded rows."""
+    """Return the observation of a trajectory.
+
+    Point 0 is at time 0, before all transitions; transitions come before a row at the same time.
+    The modes of charts come from recorded rows; a region of a chart whose mode is not recorded has
+    none.
+    """
     moves = [event for event in trajectory.events if event.kind == "transition"]
     moves.sort(key=lambda event: event.time)
     chart_modes = _recorded_chart_modes(system, trajectory)
@@ -172,7 +184,9 @@ def _recorded_chart_modes(system: System, trajectory: Trajectory) -> dict[Region
 def evaluate_series(condition: Condition, run: ObservedRun) -> Series:
     """Return the values of a condition at all points where it is known.
 
-    With signals these are the rows, else all points. Equal operands are evaluated once.
+    With signals these are the recorded rows, else all points. `count` and `rms` of a quantity
+    before its first value are 0 and NaN, `first` is NaN until its condition holds. Raises KeyError
+    for a signal that was not recorded.
     """
     by_row = bool(condition.all_signals)
     points = [k for k, point in enumerate(run.points) if not by_row or point.row != NO_ROW]
@@ -208,7 +222,10 @@ def evaluate_series(condition: Condition, run: ObservedRun) -> Series:
 
 
 def point_at_or_before(run: ObservedRun, time: float) -> int:
-    """Return the index of the last point that is not later than a time [s]; 0 if all are later."""
+    """Return the index of the last point that is not later than a time [s]; 0 if all are later.
+
+    Times within `time_tolerance` are equal.
+    """
     limit = time + time_tolerance(time)
     last = 0
     for k, point in enumerate(run.points):
@@ -219,7 +236,10 @@ def point_at_or_before(run: ObservedRun, time: float) -> int:
 
 
 def time_tolerance(time: float) -> float:
-    """Return the difference [s] below which two times are equal."""
+    """Return the difference [s] up to which two times are equal.
+
+    It is TIME_TOLERANCE_ULPS units in the last place of `time`.
+    """
     return TIME_TOLERANCE_ULPS * math.ulp(time)
 
 

@@ -57,7 +57,11 @@ class TracedRequirement:
 
     @property
     def state(self) -> str:
-        """The state: `unimplemented`, `untested` or `traced`."""
+        """The state: `unimplemented`, `untested` (implementations only) or `traced`.
+
+        A requirement without implementations is `unimplemented`, also if a test names it. Results
+        of tests do not matter.
+        """
         if not self.implementations:
             return "unimplemented"
         return "traced" if self.verifications else "untested"
@@ -72,7 +76,7 @@ class RequirementTrace:
     requirements: tuple[TracedRequirement, ...] = field(default_factory=tuple)
 
     def with_state(self, state: str) -> list[str]:
-        """Return the names of the requirements in a state."""
+        """Return the names of the requirements in a state, in their order."""
         return [each.name for each in self.requirements if each.state == state]
 
 
@@ -85,7 +89,9 @@ def trace_requirements(
     """Return the trace of requirements over specs (templates not expanded), C and tests.
 
     `code` is C text by automaton and file name. Each test comes with the results of its
-    expectations, empty if it was not run. `requirement_texts` are the texts of known requirements.
+    expectations by name, empty if it was not run; a test that names a requirement itself has passed
+    if all of them have. `requirement_texts` are the texts of known requirements, which come first,
+    also if nothing names them. A requirement of a whole spec has line 1 of each C file.
     """
     cited = citations(code)
     implementations: dict[str, list[Implementation]] = {}
@@ -115,9 +121,10 @@ def trace_requirements(
 
 
 def citations(code: Mapping[str, Mapping[str, str]]) -> dict[tuple[str, str], list[CodeLine]]:
-    """Return the lines of C by the cited automaton and key path.
+    """Return the lines of C by the cited automaton and key path (CITATION).
 
-    A citation without a name refers to the automaton of the file.
+    Lines are (file, number from 1), in file order; a line that cites twice is listed twice. A
+    citation without a name refers to the automaton of the file.
     """
     found: dict[tuple[str, str], list[CodeLine]] = {}
     for owner, files in code.items():

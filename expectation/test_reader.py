@@ -47,9 +47,11 @@ MAX_ROWS = 1_000_000
 def select_recorded_signals(
     scenario: Scenario, system: System, expectations: Sequence[Expectation], problems: Problems
 ) -> Scenario:
-    """Return the scenario with the signals that the expectations need; at least one.
+    """Return the scenario with the signals that the expectations need as its only recorded ones.
 
-    The modes of charts are recorded at each tick, because transitions do not determine them.
+    Without any, it is the first signal of the system. For each chart with the output `mode`, the
+    modes of all its regions are added and `every` is refined to its ticks, because transitions do
+    not determine them. More than MAX_ROWS rows after that are reported as an error.
     """
     read = [n for e in expectations for c in e.conditions for n in c.all_signals]
     every = scenario.every
@@ -97,7 +99,11 @@ MAX_EVENTS = 1_000_000
 
 
 def read_test(document: Document, project: Project, problems: Problems | None = None) -> Test:
-    """Return a checked test with its system and scenario. Raises SpecError with all problems."""
+    """Return a checked test with its system and scenario.
+
+    Raises SpecError if the document is no test or has errors; all that were found are reported to
+    `problems`, if given. Other files are read through the project.
+    """
     document = expand_document(document, project)
     problems = problems if problems is not None else Problems()
     require_kind(document, "test", problems)
