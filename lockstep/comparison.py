@@ -60,7 +60,7 @@ class Verdict:
 
     @property
     def is_equal(self) -> bool:
-        """Tell whether no value differs."""
+        """Tell whether no value differs, also if none was compared."""
         return self.differing == 0
 
 
@@ -72,7 +72,8 @@ def compare(
 ) -> Verdict:
     """Compile the Program of a tick log, run it on the inputs of the log, and compare all values.
 
-    Raises MissingToolError, BuildError.
+    `compiler` is that of `find_compiler`, or the cross compiler of `machine`. Raises
+    MissingToolError, BuildError; ValueError as `compare_output` does.
     """
     with build_executable(log.program, flags, compiler, machine) as target:
         return compare_output(log, machine.run(target, b"".join(log.inputs)))
@@ -81,7 +82,8 @@ def compare(
 def add_instruction_counts(verdict: Verdict, log: TickLog, flags: Sequence[str] = FLAGS) -> Verdict:
     """Return a verdict with the instruction counts of the first steps on a Cortex-M4F.
 
-    Raises MissingToolError, BuildError.
+    These are at most MAX_COUNTED_STEPS steps, run in QEMU on the inputs of the log. Raises
+    MissingToolError, BuildError.
     """
     records = b"".join(log.inputs[:MAX_COUNTED_STEPS])
     return replace(verdict, instructions=count_instructions(log.program, records, flags))
@@ -90,7 +92,8 @@ def add_instruction_counts(verdict: Verdict, log: TickLog, flags: Sequence[str] 
 def compare_output(log: TickLog, output: bytes) -> Verdict:
     """Return the verdict on the output that the C wrote for the inputs of a tick log.
 
-    Raises ValueError if the output has another length than the values of the log.
+    Values are compared bit by bit, so 0.0 and -0.0 differ, but all NaN are equal (rule 17c). Raises
+    ValueError if the output has another length than the values of the log.
     """
     size, ticks = log.record_size, len(log.values)
     differing, first = 0, None
@@ -116,7 +119,10 @@ def compare_output(log: TickLog, output: bytes) -> Verdict:
 
 
 def skipped_verdict(name: str, program: Program, reason: str) -> Verdict:
-    """Return the verdict on an instance that was not compared; `reason` is its note."""
+    """Return the verdict on an instance that was not compared; `reason` is its note.
+
+    All its counts are 0, so `is_equal` is true.
+    """
     return Verdict(name, program.name, 0, 0, 0, 0, None, reason)
 
 

@@ -16,10 +16,10 @@ from lockstep.comparison import Verdict, skipped_verdict
 def add_notes(
     verdicts: Sequence[Verdict], system: System, scenario: Scenario, trajectory: Trajectory
 ) -> list[Verdict]:
-    """Return the verdicts with notes, and one for each instance of the system that has none.
+    """Return the verdicts with notes, and a skipped verdict for each other instance of the system.
 
-    A note on a continuous instance is added if it was compared up to a part of the horizon, unless
-    the simulation stopped.
+    Given verdicts keep their order and come first. A continuous instance that was compared up to a
+    part of the horizon gets a note with that time, unless the simulation stopped.
     """
     scenario = resolve_recording(system, scenario)
     verdict_by_instance = {verdict.name: verdict for verdict in verdicts}

@@ -57,8 +57,9 @@ def fuzz(
 ) -> FuzzReport:
     """Run libFuzzer on the C of a sampled Program and compare every sequence with the interpreter.
 
-    Checksums are compared first, then single values. `ranges` gives ranges of inputs by name.
-    Raises MissingToolError, BuildError.
+    Equal sequences are replayed once. Checksums are compared first; the first MAX_COMPARED that
+    differ are compared value by value, later ones count as differing. `ticks` is the maximum of a
+    sequence. `ranges` gives ranges of inputs by name. Raises MissingToolError, BuildError.
     """
     run = run_fuzzer(program, ranges, runs, ticks, seed)
     table = word_table(program, ranges)

@@ -55,7 +55,11 @@ class TickLog:
         self._slices = [slice(*ends[k : k + 2]) for k in range(len(kinds))]
 
     def record_tick(self, stepper: Stepper) -> None:
-        """Append the inputs, a changed calibration page, and the values after a tick."""
+        """Append the inputs and values after a tick, and count its transitions.
+
+        A record of inputs ends with 0.0, or with 1.0 and the real tunable scalars if one of them
+        has changed since the last tick (at first: since the default).
+        """
         inputs = [float(stepper.get(name)) for name in self._input_names]
         page = [stepper.get(name) for name in self._tunable_names]
         record = self._input.pack(*inputs, float(page != self._page))
@@ -78,16 +82,22 @@ class TickLog:
         return int(before not in ((), self._modes))
 
     def unpack(self, record: bytes) -> tuple[float | int, ...]:
-        """Return the values of a record."""
+        """Return the values of a record of `values`, in the order of `names`.
+
+        A real is a float, any other value an integer.
+        """
         return self._value.unpack(record)
 
     def value_bytes(self, record: bytes, position: int) -> bytes:
-        """Return the bytes of one value of a record."""
+        """Return the bytes of one value of a record, in little-endian order.
+
+        `record` is one of `values`, `position` an index of `names`.
+        """
         return record[self._slices[position]]
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of the values of a record."""
+        """The names of the values of a record: those of `compared_variables`."""
         return self._names
 
     @property
@@ -99,7 +109,8 @@ class TickLog:
 def record_ticks(system: System, scenario: Scenario) -> tuple[Trajectory, dict[str, TickLog]]:
     """Simulate a scenario; return the trajectory and the tick log of each instance by name.
 
-    An instance that executed no tick has no log.
+    Logs are in the order of the first ticks; an instance that executed no tick has none. A log
+    starts at the offset of its instance.
     """
     logs: dict[str, TickLog] = {}
 
