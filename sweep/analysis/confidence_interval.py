@@ -26,8 +26,10 @@ DrawIndices = NDArray[np.int64]
 
 
 def sum_by_draw(values: Reals, draws: DrawIndices) -> Reals:
-    """Return the sum of the values (n,) of each draw (n_draws,), in ascending order of the draw
-    index.
+    """Return the sum of the values (n,) of each draw (n_draws,).
+
+    `draws` (n,) holds the index of the draw of each value. The sums are in ascending order of the
+    indices that occur; others have no entry.
     """
     _, places = np.unique(draws, return_inverse=True)
     return np.bincount(places.reshape(-1), values).astype(np.float64)
@@ -36,8 +38,9 @@ def sum_by_draw(values: Reals, draws: DrawIndices) -> Reals:
 def interval_of_mean(values: Reals, draws: DrawIndices, confidence: float) -> Interval:
     """Return the confidence interval of the mean of values (n,) that belong to draws (n,).
 
-    The ends have the unit of the values. Return None for fewer than two draws, or if an end is not
-    finite.
+    It is symmetric around the mean: Student's t with the number of draws minus one, and the
+    variance of a ratio estimator over the totals of the draws. The ends have the unit of the
+    values. Returns None for fewer than two draws, or if an end is not finite.
     """
     count = len(values)
     own, exponent = scale_to_squarable(values)
@@ -57,8 +60,8 @@ def interval_of_mean(values: Reals, draws: DrawIndices, confidence: float) -> In
 def interval_of_rate(hits: Reals, sizes: Reals, confidence: float) -> Interval:
     """Return the score interval of the rate sum(hits) / sum(sizes), with arrays (n_draws,).
 
-    `hits[k]` of the `sizes[k]` trials of draw k were successful. Return None for fewer than two
-    draws.
+    `hits[k]` of the `sizes[k]` trials of draw k were successful. It is the Wilson interval at the
+    `effective_sample_size`. Returns None for fewer than two draws with trials.
     """
     count = effective_sample_size(hits, sizes, confidence)
     return (
@@ -69,13 +72,13 @@ def interval_of_rate(hits: Reals, sizes: Reals, confidence: float) -> Interval:
 
 
 def effective_sample_size(hits: Reals, sizes: Reals, confidence: float) -> float:
-    """Return the number of independent trials that determine a rate as precisely as the clustered
-    ones.
+    """Return the number of independent trials that are as precise for a rate as the clustered ones.
 
     The arrays (n_draws,) hold the successes and the trials of each draw (Korn and Graubard 1998).
     The result is at most the number of trials. It is the number of draws if the rate is 0 or 1,
-    because the variance is then unknown. A factor (ratio of the two Student quantiles) accounts for
-    the uncertainty of the variance. Return 0 for fewer than two draws with trials.
+    because the variance is then unknown. A factor (squared ratio of the two Student quantiles, at
+    most 1) accounts for the uncertainty of the variance. Returns 0 for fewer than two draws with
+    trials.
     """
     sizes, hits = sizes[sizes > 0], hits[sizes > 0]
     draws, count = len(sizes), float(np.sum(sizes))
@@ -94,9 +97,10 @@ def effective_sample_size(hits: Reals, sizes: Reals, confidence: float) -> float
 
 
 def wilson_interval(hits: float, count: float, confidence: float) -> Interval:
-    """Return the score interval (Wilson 1927) of `hits` successes in `count` trials.
+    """Return the score interval (Wilson 1927) of the rate of `hits` successes in `count` trials.
 
-    The numbers may be fractional, because effective sample sizes are. Return None without trials.
+    The numbers may be fractional, because effective sample sizes are. The low end is exactly 0
+    without hits, the high end exactly 1 if all are hits. Returns None without trials.
     """
     if count == 0:
         return None
@@ -115,9 +119,10 @@ def interval_of_quantile(
 ) -> Interval:
     """Return the interval of the quantile at `level`, whose ends are two of the values (n,).
 
-    For m independent values the ends are the l-th and the u-th smallest value with P(l <= B < u) >=
-    confidence, B binomial(m, level). With an effective sample size m < n the ranks are scaled by n
-    / m. Return None if there are too few values.
+    `draws` (n,) holds the draw of each value. For m independent values the ends are the l-th and
+    the u-th smallest value with P(l <= B < u) >= confidence, B binomial(m, level). With an
+    effective sample size m < n the ranks are scaled by n / m. Returns None if such ranks do not
+    exist.
     """
     count = len(values)
     if count == 0:

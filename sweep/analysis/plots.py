@@ -32,7 +32,8 @@ def histogram_bin_edges(values: Reals) -> Reals:
     """Return the edges (n_bins + 1,) of the bins of a histogram of values (n,).
 
     The number of bins is the larger one of Freedman and Diaconis (1981) and Sturges (1926), at most
-    MAX_BINS. Values that differ by rounding only get one bin; no values give [0, 1].
+    MAX_BINS; the bins are equal, from minimum to maximum. Values whose range is at most
+    RELATIVE_ROUNDING of their magnitude get one bin around them; no values give [0, 1].
     """
     if not len(values):
         return np.array([0.0, 1.0])
@@ -70,7 +71,9 @@ A character is 0.06 inch wide and the axis 4.8 inches.
 def draw_pictures(store: Store) -> dict[str, Picture]:
     """Return the plots of a study by name, drawn from the variants that are finished.
 
-    A plot without finished variants contains a note instead. Raises SpecError for a damaged store.
+    A plot without finished variants contains a note instead. Values above MAX_DRAWN_MAGNITUDE are
+    left out and counted in the title. Raises SpecError for a damaged store, MissingToolError
+    without pyarrow.
     """
     table = StudyTable(store)
     draw = {
@@ -315,7 +318,7 @@ def _nominal_result(table: StudyTable, result: Reals) -> float:
 def rank_correlation(a: Reals, b: Reals) -> float:
     """Return Spearman's rank correlation of two columns (n,); ties get their mean rank.
 
-    Return 0 if a column is constant.
+    Returns 0 if a column is constant.
     """
     from scipy.stats import rankdata
 

@@ -76,9 +76,11 @@ class Sensitivity:
     indices: tuple[Index, ...]
 
     def csv(self) -> str:
-        """Return the indices as CSV text with numbers in SI.
+        """Return the indices as CSV text with a header and one row for each index.
 
-        NaN and missing intervals are empty.
+        The columns are the group names, measure, unit, name, the INDEX_NAMES of the method,
+        `<index>_from` and `<index>_to` for each, used, count. Numbers are in SI; NaN and missing
+        intervals are empty.
         """
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
@@ -110,8 +112,11 @@ class DesignGroup:
 def sensitivity_of(store: Store) -> Sensitivity:
     """Return the sensitivity indices of the finished variants of a store.
 
-    Raises SpecError if the study has no design for indices or the store is damaged, and
-    MissingToolError without pyarrow.
+    There is one `Index` for each measure that is no list, each group (combination of variant,
+    scenario and grid values) and each random variable, in this order. It is NaN for a variable with
+    one value in the group and for fewer than MIN_COMPLETE complete blocks or paths. Raises
+    SpecError if the study has no design for indices or the store is damaged, MissingToolError
+    without pyarrow.
     """
     manifest, design = store.manifest, store.manifest.design
     if not design.has_indices:
@@ -140,8 +145,9 @@ def sensitivity_of(store: Store) -> Sensitivity:
 def sobol_indices(results: Reals) -> dict[str, Reals]:
     """Return first-order and total Sobol indices (..., d) of results (..., n, d + 2).
 
-    The last axis holds the results at A, at B and at A with column i of B. The indices are NaN or
-    infinite if the variance is zero.
+    The keys are `first` and `total`. The last axis holds the results at A, at B and at A with
+    column i of B. The variance is that of A and B together; the indices are NaN or infinite if it
+    is zero.
     """
     a, b, mixed = results[..., :1], results[..., 1:2], results[..., 2:]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -153,7 +159,11 @@ def sobol_indices(results: Reals) -> dict[str, Reals]:
 
 
 def morris_indices(effects: Reals) -> dict[str, Reals]:
-    """Return mu_star, mu and sigma (..., d) of elementary effects (..., n, d)."""
+    """Return `mu_star`, `mu` and `sigma` (..., d) of elementary effects (..., n, d).
+
+    They are the mean magnitude, the mean and the standard deviation (divisor n - 1). An overflow
+    gives a value that is not finite.
+    """
     with np.errstate(
         over="ignore", invalid="ignore"
     ):  # an overflow gives a value that is not finite
@@ -165,12 +175,11 @@ def morris_indices(effects: Reals) -> dict[str, Reals]:
 
 
 def elementary_effects(results: Reals, points: Reals) -> Reals:
-    """Return the elementary effects (n, d) of results (n, d + 1) at levels (n, d + 1, d) of Morris
-    paths.
+    """Return the elementary effects (n, d) of Morris paths, one for each path and variable.
 
-    Each step changes the level of one variable by the stride. The effect is the signed difference
-    of the results over the change of the level; it is zero if the changed level draws the same
-    value.
+    The results (n, d + 1) belong to the quantile levels `points` (n, d + 1, d). Each step changes
+    the level of one variable by the stride. The effect is the signed difference of the results over
+    the change of the level; it is zero if the changed level draws the same value.
     """
     moved = np.diff(points, axis=1)
     changed = np.argmax(np.abs(moved), axis=2)

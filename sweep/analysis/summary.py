@@ -49,7 +49,9 @@ class Failure:
 def failures_of(table: StudyTable) -> tuple[Failure, ...]:
     """Return the reasons of failure of the unfinished variants, the most frequent one first.
 
-    Messages that differ in numbers only are merged. Ties are in the order of the first variant.
+    Variants with the same status, and messages that differ in numbers only, are one reason; a
+    number inside a quoted name counts as text. Ties are in the order of the first variant. Empty if
+    all are finished.
     """
     if table.is_done.all():
         return ()
@@ -153,7 +155,9 @@ class Summary:
     def csv(self) -> str:
         """Return statistics and rates as CSV text with numbers in SI.
 
-        Columns that do not apply to a row are empty.
+        The header has the group names, measure, unit, count, draws, LINE_FIELDS, RATE_FIELDS and
+        `<statistic>_from` and `_to` of mean, median and share. Rows of statistics come before rows
+        of rates. Cells that do not apply, and NaN, are empty.
         """
         text = io.StringIO()
         entries: list[SummaryLine | Rate] = [*self.lines, *self.rates]
@@ -182,7 +186,13 @@ def _interval_columns(name: str, interval: Interval) -> dict[str, float]:
 
 
 def summary_of(store: Store) -> Summary:
-    """Return the summary of the stored variants. Raises SpecError and MissingToolError."""
+    """Return the summary of the stored variants.
+
+    Statistics and rates include finished variants only, by group; a group without any is left out.
+    Measures of texts and truth values have no statistics; truth values and the parts
+    RATE_DENOMINATORS of a match have rates. Raises SpecError for a damaged store, MissingToolError
+    without pyarrow.
+    """
     table = StudyTable(store)
     manifest = store.manifest
     confidence = manifest.presentation.confidence
@@ -227,8 +237,8 @@ def _group_masks(table: StudyTable) -> Iterator[tuple[dict[str, str], NDArray[np
 def group_names(table: StudyTable) -> list[str]:
     """Return the columns by which results are grouped.
 
-    These are the columns in the study's `summary: by`, else `variant` and `scenario` if they have
-    more than one value.
+    These are the columns in the study's `summary: by`, else those of `variant` and `scenario` that
+    have more than one value; possibly none.
     """
     if table.store.manifest.presentation.by:
         return list(table.store.manifest.presentation.by)
@@ -236,8 +246,11 @@ def group_names(table: StudyTable) -> list[str]:
 
 
 def group_values(table: StudyTable, name: str) -> tuple[NDArray[np.int64], list[str]]:
-    """Return the index (n_variants,) of each value in the list of different values, and their
-    names.
+    """Return the index (n_variants,) of each value in the list of different ones, and their names.
+
+    `name` is `variant`, `scenario` (in order of first occurrence) or a variable (in ascending
+    order; names are enumeration words or numbers in the display unit, `-` for missing). Raises
+    StopIteration for a measure.
     """
     if name in ("variant", "scenario"):
         return table.read_categories(name)
@@ -250,7 +263,10 @@ def group_values(table: StudyTable, name: str) -> tuple[NDArray[np.int64], list[
 
 
 def format_value(value: float, column: StoreColumn) -> str:
-    """Return a value [SI] of a column with six digits in the display unit; `-` for NaN."""
+    """Return a value [SI] of a column in its display unit, like `12.5 ms`; `-` for NaN.
+
+    It has six digits; the unit is left out if it is 1.
+    """
     if math.isnan(value):
         return "-"
     number = f"{to_display_unit(value, column):.6g}"
