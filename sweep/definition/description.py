@@ -19,7 +19,8 @@ NAMED_SECTIONS = ("vary", "set", "measures")
 def description_of(tree: MappingNode, overrides: Mapping[str, ScalarNode]) -> Description:
     """Return the texts of the sections of a study by key, and the overrides under `--set`.
 
-    Sections without content are absent.
+    The sections are DESCRIBED_SECTIONS; those of NAMED_SECTIONS are texts by entry. A text is one
+    line of YAML. Absent sections and `--set` without overrides have no key.
     """
     found: dict[str, str | dict[str, str]] = {}
     for key in DESCRIBED_SECTIONS:

@@ -24,7 +24,12 @@ FORM_TEXTS = {
 
 
 def fault_of_distribution(distribution: Distribution) -> tuple[str, str] | None:
-    """Return the code and the text of the problem of a distribution; None if it is valid."""
+    """Return the code and the text of the problem of a distribution; None if it is valid.
+
+    The code is `form` for misplaced weights and an invalid choice, else `range`: FORM_TEXTS for a
+    wrong number or order of parameters, ends too far apart, a truncation that leaves fewer than
+    MIN_LEVELS_WITHIN levels.
+    """
     if distribution.shape == "choice":
         return _fault_of_choice(distribution)
     if distribution.weights:
@@ -73,8 +78,8 @@ def _fault_of_choice(distribution: Distribution) -> tuple[str, str] | None:
 def log_spaced(first: Fraction, last: Fraction, count: int) -> tuple[float, ...]:
     """Return `count` numbers from `first` to `last` with a constant ratio; the ends are included.
 
-    Both ends are positive and `count` is at least 2. An extreme ratio is computed from powers of
-    the ends.
+    Both ends are positive, in any order, and `count` is at least 2. A ratio beyond MAX_RATIO is
+    computed from powers of the ends.
     """
     start, end = float(first), float(last)
     shares = [k / (count - 1) for k in range(count - 1)]

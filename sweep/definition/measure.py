@@ -129,12 +129,16 @@ class StoreColumn:
 
     @property
     def label(self) -> str:
-        """The display unit as readers see it."""
+        """The display unit as readers see it: that of `shown`, or of `unit` if that is empty."""
         return display_unit(self.shown or self.unit)
 
 
 def columns_of(measure: Measure) -> tuple[StoreColumn, ...]:
-    """Return the columns that a measure fills: eight for a match, else one."""
+    """Return the columns that a measure fills: several for a match, else one.
+
+    A match has `<measure>.<part>` for each of MATCH_PARTS. The one has the name and unit of the
+    measure; it is truth for a truth value, whole for a count of events, else real.
+    """
     if isinstance(measure, MatchMeasure):
         return tuple(
             StoreColumn(f"{measure.name}.{part}", kind, "1" if kind == "whole" else "s")  # type: ignore[arg-type]

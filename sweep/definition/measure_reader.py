@@ -78,7 +78,12 @@ class MeasureReader(Reader):
         self.expressions: dict[str, tuple[Formula, Dimension]] = {}
 
     def measures(self, node: YamlNode | None, at: Span) -> tuple[Measure, ...]:
-        """Return the valid measures of a section and report the problems of the others."""
+        """Return the valid measures of a section in their order; report the problems of the others.
+
+        A missing or empty section is reported at `at`. An event, signal or expression must be valid
+        in all systems. Later references to an invalid measure are not reported again. Fills
+        `dimensions` and `expressions`.
+        """
         found = []
         for entry in self.named_entries(node, "measures"):
             measure = self._measure(entry)

@@ -10,8 +10,9 @@ from sweep.definition.study import Study, Target
 def require_overridable(study: Study, names: Iterable[str]) -> None:
     """Raise ValueError if the study assigns one of the named parameters in each variant.
 
-    A variable of one-at-a-time sampling may be overridden: the value holds in the variants that
-    vary another variable.
+    These are the parameters among the targets of `vary` and `set`. A name without an instance
+    matches the parameter of every instance; unknown names pass. With one-at-a-time sampling the
+    targets of `vary` may be overridden, because only one variable at a time has a value.
     """
     for name in names:
         owner, _, short = name.rpartition(".")

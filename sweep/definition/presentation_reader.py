@@ -50,9 +50,10 @@ class PresentationReader(Reader):
         self.example = self.numbers[0] if self.numbers else "late"
 
     def presentation(self, summary: YamlNode | None, plots: YamlNode | None) -> Presentation:
-        """Return the presentation of both sections.
+        """Return the presentation of the sections `summary` and `plots`; either may be None.
 
-        Reports unknown names and a confidence out of range.
+        The default confidence is 0.95. Reports unknown names, a confidence outside MIN_CONFIDENCE
+        to MAX_CONFIDENCE, and plots of the wrong form; these are in the result nevertheless.
         """
         table = self.read_mapping(summary, "summary", ("by", "confidence"))
         by = self._names(table.get("by"), "by", self.groups, True)

@@ -33,8 +33,11 @@ class SamplingReader(Reader):
     def sampling(self, node: YamlNode | None, varied: Sequence[SweepVariable]) -> Sampling:
         """Return the sampling of a section for the given variables.
 
-        The count of a design is the number of its points. Warns if a Sobol sequence is unbalanced
-        or a Morris design cannot reach a value.
+        Without a section, or with the word `grid` or `one_at_a_time`, nothing is drawn; a random
+        variable is then an error. Otherwise the section names one of METHODS with a number; the
+        count of a design (saltelli, morris) is that number of blocks or paths times their points.
+        Errors are reported; warns if a Sobol sequence is unbalanced or a Morris design cannot reach
+        a value of a choice.
         """
         drawn = [each for each in varied if each.is_random]
         if node is None or isinstance(node, ScalarNode):
@@ -95,9 +98,9 @@ class SamplingReader(Reader):
 
 
 def find_imbalance(method: str, count: int) -> tuple[str, str] | None:
-    """Return a message and a hint if `count` is no power of 2 for a Sobol-based method.
+    """Return a message and a hint if `count` is no power of 2 for `sobol` or `saltelli`.
 
-    Return None otherwise.
+    Returns None otherwise. The hint names the power of 2 that is nearest in the logarithm.
     """
     if method not in ("sobol", "saltelli") or not count & (count - 1):
         return None

@@ -38,7 +38,7 @@ class Target:
 
     @property
     def is_input_time(self) -> bool:
-        """Return whether the target is a time in an input.
+        """Tell whether the target is a time in an input: of a step or point, or `from` or `to`.
 
         Drawn times are rounded to nanoseconds.
         """
@@ -85,7 +85,7 @@ class SweepVariable:
 
     @property
     def is_random(self) -> bool:
-        """Return whether the values are drawn from a distribution."""
+        """Tell whether the values are drawn from a distribution, not listed by an axis."""
         return isinstance(self.distribution, Distribution)
 
 
@@ -170,12 +170,12 @@ class Study:
 
     @property
     def grid_variables(self) -> tuple[SweepVariable, ...]:
-        """The variables with a list of values."""
+        """The variables with a list of values, in their order."""
         return tuple(varied for varied in self.variables if not varied.is_random)
 
     @property
     def random_variables(self) -> tuple[SweepVariable, ...]:
-        """The variables with a distribution."""
+        """The variables with a distribution, in their order."""
         return tuple(varied for varied in self.variables if varied.is_random)
 
     @property
@@ -200,8 +200,8 @@ class Study:
     def count(self) -> int:
         """The number of variants.
 
-        It is the product of the numbers of system variants, scenarios, grid points, samples and
-        replicates.
+        It is the product of the numbers of system variants, scenarios, grid points, samples (at
+        least 1) and replicates.
         """
         samples = max(1, self.sampling.count)
         shared = self.grid_count * samples * self.replicates
@@ -209,5 +209,8 @@ class Study:
 
 
 def design_group_size(method: str, dimensions: int) -> int:
-    """Return the number of points of a block (saltelli: d + 2) or path (morris: d + 1); else 1."""
+    """Return the number of points of a block (saltelli: d + 2) or path (morris: d + 1).
+
+    `dimensions` is the number d of random variables. Returns 1 for any other method.
+    """
     return {"saltelli": dimensions + 2, "morris": dimensions + 1}.get(method, 1)

@@ -58,9 +58,11 @@ def read_study(
     overrides: Overrides | None = None,
     problems: Problems | None = None,
 ) -> Study:
-    """Return a checked study with its systems and scenarios. Raises SpecError with all problems.
+    """Return a checked study with its systems and scenarios.
 
-    `overrides` are parameter values from the command line.
+    `overrides` are parameter values from the command line, applied to all systems. Other files are
+    read through the project; recordings are not. Raises SpecError if the document is no study or
+    has errors; all that were found are reported to `problems`, if given.
     """
     document = expand_document(document, project)
     problems = problems if problems is not None else Problems()
@@ -302,7 +304,10 @@ def _bind_scenarios(
 
 
 def signals_of(measures: tuple[Measure, ...]) -> tuple[str, ...]:
-    """Return the names of the signals of the measures in their order, without duplicates."""
+    """Return the recorded signals of the signal measures in their order, without duplicates.
+
+    Other measures are ignored.
+    """
     found = [measure.signal for measure in measures if isinstance(measure, SignalMeasure)]
     return tuple(dict.fromkeys(found))
 

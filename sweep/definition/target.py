@@ -42,8 +42,11 @@ class TargetInfo:
 def find_targets(system: System, scenarios: list[Document]) -> dict[str, TargetInfo]:
     """Return all targets of a system and of expanded scenarios by name.
 
-    A parameter name without an instance refers to all instances that have it. With a single
-    instance, `initial.<state>` needs no instance.
+    Names: `<instance>.<parameter>` (not derived, no table), `initial.<instance>.<state>` (real),
+    `<sensor>.<stage>` for stages that the sensor has, `<instance>.period`, `.step` or `.offset`,
+    and `inputs.<name>.<part>` of real inputs; a later scenario replaces parts of the same name. A
+    parameter name without an instance refers to all instances that have it, with the unit and range
+    of the first. With a single instance, `initial.<state>` needs no instance.
     """
     found: dict[str, TargetInfo] = {}
     for name, place in (*_parameters(system), *_initial_values(system), *_sensors(system)):

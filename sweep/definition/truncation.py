@@ -8,7 +8,10 @@ from sweep.definition.study import Distribution
 
 
 def truncation_levels(distribution: Distribution) -> tuple[float, float]:
-    """Return the cumulative probabilities of a normal or lognormal at the ends of `within`."""
+    """Return the cumulative probabilities of a normal or lognormal at the ends of `within`.
+
+    `within` must not be None; a bound of a lognormal below 1e-300 counts as 1e-300.
+    """
     from scipy.special import ndtr
 
     assert distribution.within

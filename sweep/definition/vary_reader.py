@@ -47,7 +47,11 @@ class VaryReader(Reader):
         self.kinds: dict[str, ExprType] = {}
 
     def variables(self, node: YamlNode | None) -> tuple[SweepVariable, ...]:
-        """Return the valid variables in the order of the file; reports the others."""
+        """Return the valid variables of the section `vary` in file order; reports the others.
+
+        A name is a target or a new name without dots, to which `set` may refer. A target with two
+        values is reported. None gives no variables.
+        """
         found = []
         for entry in self.read_mapping(node, "vary"):
             with self.problems.collect_errors():
@@ -235,7 +239,9 @@ class VaryReader(Reader):
     ) -> tuple[Setting, ...]:
         """Return the assignments of the section `set`, checked for types and dimensions.
 
-        Reports variables that have no target and appear in no setting.
+        `variables` are those of the section `vary`, which must be read first. Unknown targets and
+        those that have a value already are reported. Reports variables that have no target and
+        appear in no setting, unless there are other errors.
         """
         parameters = {
             name: place.unit.dimension
