@@ -31,7 +31,8 @@ OPEN_UNIT_MARGIN = 2.0**-54
 def draw_values(study: Study, samples: Sequence[int]) -> list[dict[str, float]]:
     """Return the drawn values [SI] by variable name, one dict for each of the samples.
 
-    Times in inputs are rounded to nanoseconds. Without random variables the dicts are empty.
+    `samples` are indices; the values of an index do not depend on the others. Times in inputs are
+    rounded to nanoseconds. Without random variables the dicts are empty.
     """
     drawn = study.random_variables
     if not drawn:
@@ -49,7 +50,11 @@ def draw_values(study: Study, samples: Sequence[int]) -> list[dict[str, float]]:
 
 
 def quantile(distribution: Distribution, level: Reals) -> Reals:
-    """Return the values [SI] (n,) of a distribution at the quantile levels (n,) in (0, 1)."""
+    """Return the values [SI] (n,) of a distribution at the quantile levels (n,) in (0, 1).
+
+    With `within`, the levels are those of the truncated distribution, and values are clipped to its
+    bounds. Of a choice, a level on a boundary gives the later value.
+    """
     if distribution.shape == "choice":
         weights = np.asarray(distribution.weights or [1.0] * len(distribution.numbers))
         bounds = np.cumsum(weights) / np.sum(weights)

@@ -22,8 +22,9 @@ def saltelli_points(
 ) -> Reals:
     """Return the quantile levels (n_samples, dimensions) of samples of a Saltelli design.
 
-    A block has dimensions + 2 samples: row A, row B, then A with column i of B for each i. `sobol`
-    returns a row (2 * dimensions,) of a sequence, A and B side by side.
+    `samples` are indices. A block has dimensions + 2 samples: row A, row B, then A with column i of
+    B for each i. `sobol` returns the row (2 * dimensions,) of a sequence for a block number, A and
+    B side by side.
     """
     points = np.empty((len(samples), dimensions))
     for place, sample in enumerate(samples.tolist()):
@@ -38,7 +39,9 @@ def saltelli_points(
 def morris_points(dimensions: int, samples: NDArray[np.int64], seed: int) -> Reals:
     """Return the quantile levels (n_samples, dimensions) of samples of Morris paths.
 
-    A path has dimensions + 1 samples; each step changes one variable by STRIDE levels.
+    `samples` are indices. A path has dimensions + 1 samples; each step changes one variable by
+    STRIDE of the MORRIS_LEVELS levels, in random order and direction. Path k depends on `seed` and
+    k only.
     """
     paths: dict[int, Reals] = {}
     points = np.empty((len(samples), dimensions))

@@ -29,15 +29,16 @@ class Variant:
     def seed(self, base: int, replicates: int, group_size: int = 1) -> int:
         """Return the seed of the noise; each sample and each replicate has its own.
 
-        The `group_size` samples of a block or path share it, so that their differences are not due
-        to noise (common random numbers; Law, Simulation Modeling and Analysis, 5th ed. 2015,
-        section 11.2).
+        It is base + (sample // group_size) * replicates + replicate, modulo SEED_MODULUS. The
+        `group_size` samples of a block or path share it, so that their differences are not due to
+        noise (common random numbers; Law, Simulation Modeling and Analysis, 5th ed. 2015, section
+        11.2).
         """
         return (base + self.sample // group_size * replicates + self.replicate) % SEED_MODULUS
 
 
 def variants_of(study: Study, start: int, stop: int) -> list[Variant]:
-    """Return the variants with numbers from `start` to `stop` (exclusive).
+    """Return the variants with numbers from `start` to `stop` (exclusive), in ascending order.
 
     The replicate changes fastest, then the sample, the grid (its last axis first), the scenario and
     the system variant. Hence all of these share the same samples.

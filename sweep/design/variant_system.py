@@ -24,7 +24,8 @@ TargetValues = Iterable[tuple[Target, float]]
 def apply_to_system(system: System, values: TargetValues) -> System:
     """Return the system with changed sensor stages, periods, steps and offsets.
 
-    Other targets are ignored.
+    A value is taken as its shortest decimal, exactly. Targets of other kinds (parameters, initial
+    values, inputs) are ignored. Raises KeyError for an unknown sensor or instance.
     """
     sensors, instances = dict(system.sensors), dict(system.instances)
     for target, value in values:
@@ -44,9 +45,11 @@ def apply_to_system(system: System, values: TargetValues) -> System:
 
 
 def apply_to_scenario(binding: ScenarioBinding, system: System, values: TargetValues) -> Scenario:
-    """Return the scenario with changed parts of inputs; unchanged without such targets.
+    """Return the scenario with changed parts of inputs; unchanged without targets of inputs.
 
-    Raises SpecError if the changed inputs are invalid, e.g. steps out of order.
+    Times are rounded to nanoseconds. Horizon, seed and initial values are those of the bound
+    scenario, whose `document` must be present. Raises SpecError if the changed inputs are invalid,
+    e.g. steps out of order.
     """
     input_values = [(target, value) for target, value in values if target.kind == "input"]
     if not input_values:

@@ -33,8 +33,10 @@ class VariantValues:
 def variant_values_of(study: Study, variant: Variant) -> VariantValues:
     """Return the values of all targets of a variant, including those that `set` computes.
 
-    A setting is skipped if it refers to a variable without a value. Targets that the system variant
-    does not have are left out.
+    A setting is skipped if it reads a name that is neither a variable with a value nor a parameter.
+    Targets that the system variant does not have are left out. `refusal` tells of the first value
+    that is not finite, out of the range of its parameter, or a time that is not positive (an
+    offset: negative).
     """
     kind = study.system_variants[variant.system_variant]
     scenario = kind.scenario_bindings[study.scenarios[variant.scenario]].scenario
@@ -91,9 +93,12 @@ def _evaluate_setting(
 
 
 def parameter_value(system: System, name: str, target_values: Mapping[Target, float]) -> float:
-    """Return the value [SI] of a parameter in a variant; derived parameters are evaluated.
+    """Return the value [SI] of a parameter in a variant.
 
-    A name without an instance means the first instance that has the parameter.
+    It is that of `target_values`, else that of the system; a derived parameter is evaluated from
+    the parameters that it reads, and one without a value is 0. A name without an instance means the
+    first instance that has the parameter; StopIteration if none has, KeyError for an unknown
+    `instance.parameter`.
     """
     owner, _, short = name.rpartition(".")
     if not owner:
