@@ -44,7 +44,13 @@ class _BatchGroup:
 
 
 def compute_rows(study: Study, block: Block, run: BatchRunner) -> list[Row]:
-    """Return the rows of a block in the order of the variant numbers."""
+    """Return the rows of a block in the order of the variant numbers.
+
+    `run` simulates a batch. Variants that share system, scenario and kinds of values form one; if
+    it is refused (SpecError), each variant is simulated alone. A variant that cannot be simulated
+    has the status `refused` and the reason as message, and no measures; so has one that stopped
+    (`stopped`).
+    """
     cases = [
         variant_values_of(study, point) for point in variants_of(study, block.start, block.stop)
     ]

@@ -23,9 +23,9 @@ class Address:
 
     @property
     def is_unprotected(self) -> bool:
-        """Return whether others can read and change the traffic.
+        """Tell whether others can read and change the traffic.
 
-        This is the case without TLS unless the host is a loopback address.
+        This is the case for `tcp:` unless the host is `localhost` or a loopback IP address.
         """
         return self.url.startswith("tcp:") and not _is_loopback(self.host)
 
@@ -40,7 +40,11 @@ class Credentials:
 
 
 def parse_address(text: str) -> Address:
-    """Return the address that a text denotes. Raises ValueError for other forms."""
+    """Return the address that a text denotes, in one of ADDRESS_FORMS.
+
+    A local cluster has 1 to 9999 workers, a port is below 65536; a slash at the end is dropped.
+    Raises ValueError for other texts.
+    """
     local = LOCAL_PATTERN.fullmatch(text)
     if local:
         return Address(count=int(local[1]))

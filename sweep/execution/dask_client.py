@@ -68,8 +68,9 @@ def open_client(
 ) -> Iterator[Client]:
     """Yield a client of a cluster; a cluster that was started for it is closed at the end.
 
-    A block that kills `max_deaths` local workers fails. Raises ClusterError if no scheduler
-    answers, no worker joins, or a worker has different code.
+    `timeout` [s] is the longest time until a scheduler answers, and until the first worker joins. A
+    block that kills `max_deaths` local workers fails. Raises ClusterError if no scheduler answers,
+    no worker joins, a worker has another fingerprint, or TLS credentials are missing or unusable.
     """
     with ExitStack() as stack, dask.config.set({**DASK_SETTINGS, ALLOWED_FAILURES: max_deaths - 1}):
         scheduler: Any = address.url

@@ -36,7 +36,7 @@ class Answer:
 
 
 def pack_study(study: Study) -> bytes:
-    """Return a prepared study as compressed pickle."""
+    """Return a prepared study as bytes: a pickle compressed with zlib."""
     return zlib.compress(pickle.dumps(study, protocol=pickle.HIGHEST_PROTOCOL))
 
 
@@ -45,7 +45,9 @@ def answer_block(
 ) -> Answer:
     """Return the file of a block of a packed study, or why it was not computed.
 
-    The worker refuses clients with another fingerprint and studies whose Programs differ here.
+    The answer has a `refusal` for a client with another fingerprint (the study is then not
+    unpacked) and for a study whose Programs differ here. Any exception becomes a `defect`, its
+    traceback; none is raised.
     """
     refusal = describe_differences(client_fingerprint, fingerprint())
     if refusal:  # before unpickling: different code may have different classes

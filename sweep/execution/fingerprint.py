@@ -27,7 +27,11 @@ SHOWN_DIGITS = 12
 
 @lru_cache(maxsize=1)
 def fingerprint() -> Mapping[str, str]:
-    """Return the versions and digests of this process by part; equal ones give equal bits."""
+    """Return the versions and digests of this process by part; equal ones give equal bits.
+
+    The parts are `modewright` (digest of the code files of CODE_PACKAGES), `Python` (major.minor),
+    `processor`, and each of LIBRARIES (`not installed` if absent). Computed once in a process.
+    """
     found = {"modewright": _code_digest(CODE_PACKAGES)}
     found["Python"] = ".".join(platform.python_version_tuple()[:2])
     found["processor"] = platform.machine()
@@ -42,7 +46,9 @@ def fingerprint() -> Mapping[str, str]:
 def describe_differences(expected: Mapping[str, str], actual: Mapping[str, str]) -> str:
     """Return the parts whose actual value differs from the expected one, as text.
 
-    The result is empty if none does.
+    The form is `name actual instead of expected`, separated by commas; values are cut at
+    SHOWN_DIGITS characters, a missing one is `unknown`. Empty if none differs; further parts of
+    `actual` do not count.
     """
     parts = [
         f"{name} {actual.get(name, 'unknown')[:SHOWN_DIGITS]} instead of {value[:SHOWN_DIGITS]}"

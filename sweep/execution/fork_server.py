@@ -24,7 +24,8 @@ WORKER_ENVIRONMENT = {
 def start_fork_server(template: str) -> None:
     """Start the fork server, which loads the module `template` in the background.
 
-    It starts at most once in a process. On systems without fork servers this does nothing.
+    It starts at most once in a process, with WORKER_ENVIRONMENT in its environment; that of this
+    process is unchanged afterwards. On systems without fork servers this does nothing.
     """
     if start_method() != FORK_SERVER:
         return

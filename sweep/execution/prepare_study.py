@@ -16,9 +16,11 @@ from sweep.definition.study_reader import signals_of
 
 
 def prepare_study(study: Study) -> Study:
-    """Return a study that needs no files any more, with the digest of each Program in its identity.
+    """Return a study that needs no files any more.
 
-    Raises SpecError for an invalid recording or a Program that cannot be built.
+    Recordings are read, rows have the distance of the study (start and end only if no measure needs
+    a signal), and `identity` has the sampling and the digests of recordings and Programs. Raises
+    SpecError for an invalid recording or a Program that cannot be built.
     """
     sampling = study.sampling
     identity = dict(study.identity)
@@ -36,7 +38,10 @@ def prepare_study(study: Study) -> Study:
 
 
 def program_digests(study: Study) -> dict[str, str]:
-    """Return the digest of each Program of a prepared study by instance, variant and scenario."""
+    """Return the digest of each Program of a prepared study by instance, variant and scenario.
+
+    A key is "Program of `instance` in variant `variant`, scenario `scenario`".
+    """
     found = {}
     for kind in study.system_variants:
         for name, course in kind.scenario_bindings.items():
@@ -47,10 +52,11 @@ def program_digests(study: Study) -> dict[str, str]:
 
 
 def resample_study(study: Study, samples: int | None = None, seed: int | None = None) -> Study:
-    """Return the study with another number of samples or another seed.
+    """Return the study with another number of samples or another seed; None keeps the old one.
 
-    For designs `samples` is the number of blocks or paths. Raises ValueError for numbers outside
-    the limits and for studies without random variables.
+    For designs `samples` is the number of blocks or paths. Raises ValueError for samples outside 1
+    to MAX_POINTS, a seed outside 0 to MAX_SEED, more than MAX_POINTS variants, and a study without
+    random variables unless both are None.
     """
     old = study.sampling
     if (samples is not None or seed is not None) and not old.count:

@@ -42,7 +42,9 @@ def run_study(
 ) -> StudyRun:
     """Run a prepared study into a folder, or continue an earlier run.
 
-    Raises SpecError if the folder belongs to another study, and OSError if it cannot be written.
+    `block_size` is that of a new store; None chooses one. A damaged block is computed again and
+    told to `warn`. Raises SpecError if the folder belongs to another study or process or contains
+    something else, OSError if it cannot be written, MissingToolError without pyarrow.
     """
     return fill_store(
         manifest_of(study, block_size), folder, partial(executor, study), progress, warn
@@ -58,7 +60,10 @@ def fill_store(
 ) -> StudyRun:
     """Compute the missing and the damaged blocks of a store with `compute`, and store them.
 
-    Raises SpecError if the folder contains something else, and OSError if it cannot be written.
+    Each block is stored when it is finished. The iterator of `compute` is closed at the end, also
+    after an error. `progress` is called at the start and after each block. Raises SpecError if the
+    folder contains something else or another process writes into it, OSError if it cannot be
+    written.
     """
     require_same_study(folder, manifest)  # before any file is created, also the lock
     with lock_folder(folder):

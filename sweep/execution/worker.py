@@ -28,14 +28,17 @@ LENGTH_PREFIX = struct.Struct(">Q")
 
 
 def send_message(stream: IO[bytes], message: object) -> None:
-    """Write a message to a stream and flush it. Raises OSError if the reader is gone."""
+    """Write a message to a stream as its length and a pickle, and flush it.
+
+    Raises OSError if the reader is gone.
+    """
     data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
     stream.write(LENGTH_PREFIX.pack(len(data)) + data)
     stream.flush()
 
 
 def receive_message(stream: IO[bytes]) -> Any:
-    """Return the next message of a stream. Raises EOFError at its end."""
+    """Return the next message of a stream. Raises EOFError at its end, also inside a message."""
     head = stream.read(LENGTH_PREFIX.size)
     if len(head) < LENGTH_PREFIX.size:
         raise EOFError
@@ -47,7 +50,12 @@ def receive_message(stream: IO[bytes]) -> Any:
 
 
 def serve_blocks(run: BatchRunner) -> None:
-    """Answer blocks until the input ends; output of other code is redirected to stderr."""
+    """Answer the blocks on standard input with their files; never returns.
+
+    The first message is the study. A block with an exception is answered with its traceback. The
+    process ends with exit code 0 when the input closes. Ctrl-C is ignored, and what other code
+    prints goes to stderr.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process decides about the end
     source = os.fdopen(os.dup(0), "rb")
     target = os.fdopen(os.dup(1), "wb")
