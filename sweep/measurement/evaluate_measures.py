@@ -30,9 +30,11 @@ Window = tuple[float, float] | None
 
 
 def evaluate_measures(measures: Sequence[Measure], run: Observation) -> dict[str, Cell]:
-    """Return the values of all columns of the measures by name.
+    """Return the values of all columns of the measures by name, in their order.
 
-    Measures are evaluated in their order, since windows and expressions refer to earlier ones.
+    Measures are evaluated in their order, since windows and expressions refer to earlier ones. A
+    value is None if the event or signal has no such number, if an end of the window or an operand
+    is None, or if an expression is not finite. In a match without a window the counts are 0.
     """
     cells: dict[str, Cell] = {}
     for measure in measures:

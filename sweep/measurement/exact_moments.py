@@ -18,7 +18,11 @@ SQUARABLE_LIMIT = 2.0**480
 
 
 def scale_to_squarable(values: Reals) -> tuple[Reals, int]:
-    """Return values (n,) divided by a power of two, and its exponent; 0 if they are not large."""
+    """Return values (n,) divided by 2**exponent, and the exponent.
+
+    The exponent is 0, and the values are unchanged, if all magnitudes are below SQUARABLE_LIMIT;
+    else the scaled magnitudes are below 1.
+    """
     largest = float(np.max(np.abs(values), initial=0.0))
     if largest < SQUARABLE_LIMIT:
         return values, 0
@@ -49,13 +53,16 @@ def root_mean_square(values: Reals) -> float:
 
 
 def total_of(values: Reals) -> float:
-    """Return the sum of values (n,); NaN on overflow."""
+    """Return the sum of values (n,), 0 without values; NaN on overflow."""
     own, exponent = scale_to_squarable(values)
     return undo_scale(math.fsum(own), exponent)
 
 
 def quantiles_of(values: Reals, levels: Sequence[float]) -> list[float]:
-    """Return the quantiles of values (n,), n > 0, at the levels, with linear interpolation."""
+    """Return the quantiles of values (n,), n > 0, at the levels, with linear interpolation.
+
+    The values need not be sorted; levels are from 0 to 1.
+    """
     own, exponent = scale_to_squarable(values)
     return [undo_scale(float(one), exponent) for one in np.quantile(own, levels)]
 

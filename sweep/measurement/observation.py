@@ -37,7 +37,10 @@ class Observation:
     horizon: float
 
     def times_of(self, event: ModeEntryEvent) -> list[float]:
-        """Return the times [s] of an event in ascending order."""
+        """Return the times [s] at which the event's mode was entered, in ascending order.
+
+        An event without a source counts entries from any mode. The initial mode is no entry.
+        """
         return [
             happening.time
             for happening in self.mode_changes.get((event.instance, event.region), ())
@@ -45,9 +48,9 @@ class Observation:
         ]
 
     def dwell_intervals(self, event: ModeEntryEvent) -> list[tuple[float, float]]:
-        """Return start and end [s] of the active interval of the event's mode, one for each event.
+        """Return (start, end) [s] of the event's mode, one for each occurrence of the event.
 
-        A mode that is active at the end has the horizon as end.
+        The end is the next transition out of the mode, or the horizon if there is none.
         """
         intervals = []
         changes = self.mode_changes.get((event.instance, event.region), ())
@@ -61,7 +64,10 @@ class Observation:
 
 
 def observe_variant(result: BatchResult, variant: int, horizon: float) -> Observation:
-    """Return the observation of one variant of a batch, by its place in the batch."""
+    """Return the observation of one variant of a batch, by its index in the batch.
+
+    Only transitions among its events count. `horizon` [s] is the planned end of the run.
+    """
     mode_changes: dict[tuple[str, str], list[ModeChange]] = {}
     for place, time in zip(result.event_kinds[variant], result.event_times[variant], strict=True):
         if place == NO_EVENT:

@@ -24,7 +24,8 @@ FLATNESS_TOLERANCE = 1.0e-12
 def evaluate_signal(measure: SignalMeasure, times: Reals, values: Reals) -> float | None:
     """Return the statistic of a signal (n,) over times [s] (n,), in the unit of the measure.
 
-    Return None for an empty window, a value that is not finite, or no frequency.
+    `final` is the last value, `peak` the largest magnitude. Returns None for an empty window, a
+    value that is not finite, or no frequency; NaN if the mean or root mean square overflows.
     """
     if not len(values) or not np.all(np.isfinite(values)):
         return None
@@ -49,8 +50,9 @@ def evaluate_signal(measure: SignalMeasure, times: Reals, values: Reals) -> floa
 
 
 def settling_time(times: Reals, values: Reals, band: float) -> float:
-    """Return the time [s] from the start until the signal stays within a band around its last
-    value.
+    """Return the time [s] from the first sample until the signal stays close to its last value.
+
+    That is the first sample from which on no value differs from the last one by more than `band`.
     """
     with np.errstate(over="ignore"):  # an infinite difference is outside the band
         outside = np.flatnonzero(np.abs(values - values[-1]) > band)
@@ -59,9 +61,10 @@ def settling_time(times: Reals, values: Reals, band: float) -> float:
 
 
 def frequency_by_crossings(times: Reals, values: Reals) -> float | None:
-    """Return the frequency [1/s] from the upward crossings of the detrended signal.
+    """Return the mean frequency [1/s] between the first and the last upward crossing of the signal.
 
-    Crossing times are interpolated linearly. Return None for fewer than two crossings.
+    The signal is taken minus its least-squares line; crossing times are interpolated linearly.
+    Returns None for fewer than two crossings.
     """
     level = _detrend(times, values)
     if not len(level):
@@ -77,8 +80,9 @@ def frequency_by_crossings(times: Reals, values: Reals) -> float | None:
 def frequency_by_spectrum(times: Reals, values: Reals) -> float | None:
     """Return the frequency [1/s] of the peak of the spectrum with a Hann window.
 
-    A parabola through the logarithms interpolates between bins (Smith and Serra, PARSHL, 1987).
-    Return None for fewer than MIN_SPECTRUM_ROWS samples or a constant signal.
+    The signal is taken minus its least-squares line. A parabola through the logarithms interpolates
+    between bins (Smith and Serra, PARSHL, 1987). Returns None for fewer than MIN_SPECTRUM_ROWS
+    samples or a straight line. Samples must be equidistant.
     """
     count = len(values)
     level = _detrend(times, values)
