@@ -21,19 +21,24 @@ DIGEST_PLACEHOLDER = b"0" * hashlib.sha256().digest_size * 2
 
 
 def encode_block(manifest: Manifest, block: Block, rows: Sequence[Row]) -> bytes:
-    """Return the rows of a block as the bytes of its file in the store."""
+    """Return the rows of a block as the bytes of its file in the store.
+
+    It is the file of `encode_parquet` with the mark `mark_of`. Raises MissingToolError.
+    """
     return encode_parquet(manifest, rows, mark_of(manifest, block))
 
 
 def mark_of(manifest: Manifest, block: Block) -> bytes:
-    """Return the mark of a block's file: the digest of the study and the range of variants."""
+    """Return the mark of a block's file: `<digest of the study> <start>-<stop>` in UTF-8."""
     return f"{manifest.digest} {block.start}-{block.stop}".encode()
 
 
 def fault_of(manifest: Manifest, block: Block, data: bytes) -> FileFault:
-    """Return the fault of the file of a block.
+    """Return the fault of the file of a block, given its contents.
 
-    The digest is checked before pyarrow parses the bytes. A file without a digest is damaged.
+    "" for none; "another" for a file of another study; else "damaged": no digest or a wrong one, no
+    Parquet, another range of variants, number of rows or columns. The digest is checked before
+    pyarrow parses the bytes. Raises MissingToolError.
     """
     arrow = import_arrow()
     body, digest = _split_digest(data)
@@ -52,7 +57,12 @@ def fault_of(manifest: Manifest, block: Block, data: bytes) -> FileFault:
 
 
 def encode_parquet(manifest: Manifest, rows: Sequence[Row], mark: bytes) -> bytes:
-    """Return rows as a Parquet file with a mark, the units of the columns and a digest."""
+    """Return rows as a Parquet file with a mark, the units of the columns and a digest.
+
+    The columns are LEADING_COLUMNS, the variables (null without a value), STATUS_COLUMNS, the
+    measures. The digest is the SHA-256 of the file with DIGEST_PLACEHOLDER in its place. Raises
+    MissingToolError; KeyError if a row lacks a measure.
+    """
     arrow = import_arrow()
     columns: dict[str, list[Any]] = {
         name: [getattr(row, name) for row in rows] for name in (*LEADING_COLUMNS, *STATUS_COLUMNS)
@@ -112,5 +122,5 @@ def _split_digest(data: bytes) -> tuple[bytes, bytes]:
 
 
 def import_arrow() -> ModuleType:
-    """Return pyarrow with its Parquet module. Raises MissingToolError."""
+    """Return pyarrow with its Parquet module. Raises MissingToolError if it is not installed."""
     return import_pyarrow("a study")

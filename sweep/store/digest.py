@@ -11,7 +11,10 @@ STORE_FORMAT = 2
 
 
 def digest_of(identity: Mapping[str, str]) -> str:
-    """Return the SHA-256 digest of the identity (digests by part) and of the schema version."""
+    """Return the SHA-256 of the identity (digests by part) and of STORE_FORMAT, in hexadecimal.
+
+    The order of the parts does not matter.
+    """
     return hashlib.sha256(
         json.dumps([STORE_FORMAT, dict(sorted(identity.items()))]).encode()
     ).hexdigest()

@@ -61,7 +61,7 @@ class Design:
 
     @property
     def has_indices(self) -> bool:
-        """Return whether sensitivity indices can be computed from the points."""
+        """Tell whether sensitivity indices can be computed: the method is saltelli or morris."""
         return self.group_size > 1
 
 
@@ -91,13 +91,16 @@ class Manifest:
         return [Block(start, min(start + self.block_size, self.count)) for start in starts]
 
     def has(self, block: Block) -> bool:
-        """Return whether a block is one of the blocks of this manifest."""
+        """Tell whether a block is exactly one of `blocks`, with the same start and stop."""
         is_inside = 0 <= block.start < self.count and block.start % self.block_size == 0
         return is_inside and block.stop == min(block.start + self.block_size, self.count)
 
 
 def manifest_of(study: Study, block_size: int | None = None) -> Manifest:
-    """Return the manifest of a prepared study, with the given or a suitable size of blocks."""
+    """Return the manifest of a prepared study.
+
+    `block_size` is the number of variants of a block; None or 0 gives that of `choose_block_size`.
+    """
     return Manifest(
         study=study.name,
         digest=digest_of(study.identity),
@@ -127,10 +130,11 @@ def _design_of(study: Study) -> Design:
 
 
 def choose_block_size(study: Study) -> int:
-    """Return the number of variants of a block, so that there are at most about MAX_BLOCKS blocks.
+    """Return the number of variants of a block: count / MAX_BLOCKS, rounded up.
 
-    If all variants fit into one batch, blocks are larger, because each block prepares its batch
-    once; MIN_BLOCKS blocks remain for the workers.
+    If only parameters, initial values and inputs vary, so that all variants fit into one batch, it
+    is at least MIN_BATCH_SIZE, or count / MIN_BLOCKS if that is smaller, because each block
+    prepares its batch once. It is at most MAX_BLOCK_SIZE.
     """
     places = [target for varied in study.variables for target in varied.targets]
     places += [target for setting in study.settings for target in setting.targets]
@@ -140,7 +144,10 @@ def choose_block_size(study: Study) -> int:
 
 
 def encode_manifest(manifest: Manifest) -> bytes:
-    """Return the bytes of the manifest file (JSON); the key `modewright` is the schema version."""
+    """Return the bytes of the manifest file: JSON with an indent of 1 and a newline at the end.
+
+    The key `modewright` is the schema version STORE_FORMAT, `seal` the digest of all others.
+    """
     shown = manifest.presentation
     data: dict[str, Any] = {
         "modewright": STORE_FORMAT,
@@ -163,18 +170,24 @@ def encode_manifest(manifest: Manifest) -> bytes:
 
 
 def seal_of(data: Mapping[str, Any]) -> str:
-    """Return the SHA-256 digest of all entries of a manifest except `seal`, to detect changes."""
+    """Return the SHA-256 of all entries of a manifest except `seal`, in hexadecimal.
+
+    The order of keys does not matter.
+    """
     plain = {key: value for key, value in data.items() if key != "seal"}
     return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
 
 
 def store_error(folder: Path, kind: str, label: str, help: str = "") -> SpecError:
-    """Return a SpecError about a folder, for the caller to raise."""
+    """Return a SpecError about a folder, for the caller to raise.
+
+    It has one error of the given kind, at line 1 of the folder's path, with a label and a hint.
+    """
     problems = Problems()
     problems.error(kind, file_span(folder), label, help)
     return SpecError(problems.reported)
 
 
 def file_span(path: Path) -> Span:
-    """Return the span that stands for a whole file or folder."""
+    """Return the span that stands for a whole file or folder: line 1, column 1 of its path."""
     return Span(Source(str(path)), 1, 1)

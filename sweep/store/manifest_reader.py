@@ -27,9 +27,10 @@ GROUP_COLUMNS = ("variant", "scenario")
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """Return the manifest of the store in a folder.
+    """Return the manifest of the store in a folder, from its file MANIFEST_NAME.
 
-    Raises SpecError if it is missing, damaged, changed, or of another schema version.
+    Raises SpecError if it is missing, no valid JSON, changed (its seal differs), of another schema
+    version, or has an invalid entry. Blocks are not read.
     """
     try:
         data = json.loads((folder / MANIFEST_NAME).read_text("utf-8"))

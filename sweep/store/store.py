@@ -50,10 +50,11 @@ class Store:
     manifest: Manifest
 
     def scan(self) -> StoreContents:
-        """Return the complete and the damaged blocks according to their digests.
+        """Return the complete and the damaged blocks, each in ascending order, by `fault_of`.
 
-        Raises SpecError for unreadable files and for blocks of other studies, which are not
-        changed.
+        Blocks without a file are in neither; files with other names are ignored. Raises SpecError
+        for unreadable files, for blocks of other studies or of another block size, and without the
+        folder of blocks. Nothing is changed.
         """
         whole, damaged, problems = [], [], Problems()
         for path, block in self._files():
@@ -93,29 +94,39 @@ class Store:
                 yield self.folder / BLOCKS_FOLDER / name, Block(int(match[1]), int(match[2]))
 
     def paths(self) -> list[Path]:
-        """Return the paths of the block files in ascending order."""
+        """Return the paths of all block files by name, in ascending order; they are not checked.
+
+        Raises SpecError if the folder of blocks is missing.
+        """
         return [path for path, _ in self._files()]
 
     def write_rows(self, block: Block, rows: Sequence[Row]) -> None:
-        """Write the rows of a block atomically. Raises OSError."""
+        """Encode the rows of a block and write its file atomically, as `write_block_file` does.
+
+        Raises OSError, MissingToolError.
+        """
         self.write_block_file(block, encode_block(self.manifest, block, rows))
 
     def write_block_file(self, block: Block, data: bytes) -> None:
-        """Write an encoded block atomically. Raises OSError."""
+        """Write an encoded block atomically to `blocks/<start>-<stop>.parquet`.
+
+        Both numbers have ten digits. An existing file is replaced. Raises OSError.
+        """
         path = self.folder / BLOCKS_FOLDER / f"{block.start:010d}-{block.stop:010d}.parquet"
         write_atomically(path, data)
 
     def remove_partial_files(self) -> None:
-        """Remove temporary files that an interrupted process left."""
+        """Remove the temporary files `.*.part` of the store that an interrupted process left."""
         for folder in (self.folder, self.folder / BLOCKS_FOLDER):
             for path in folder.glob(".*.part"):
                 path.unlink(missing_ok=True)
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Write a file under a temporary name, flush it to the disk and rename it. Raises OSError.
+    """Write a file under a temporary name, flush it to the disk and rename it.
 
-    The temporary file is removed after an error.
+    The temporary file is `.<name>.<process>.part` in the same folder; it is removed after an error.
+    An existing file is replaced. Raises OSError.
     """
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
@@ -144,8 +155,9 @@ def _flush_folder(folder: Path) -> None:
 def open_store(folder: Path, manifest: Manifest) -> Store:
     """Create a store in a folder, or open an existing one of the same study.
 
-    An existing store keeps its block size. Raises SpecError if the folder contains something else,
-    OSError, and MissingToolError without pyarrow.
+    An existing store keeps its block size; the manifest is written anew, and temporary files are
+    removed. Raises SpecError if the folder contains something else, OSError, and MissingToolError
+    without pyarrow.
     """
     import_arrow()
     stored = require_same_study(folder, manifest)
@@ -159,9 +171,11 @@ def open_store(folder: Path, manifest: Manifest) -> Store:
 
 
 def require_same_study(folder: Path, manifest: Manifest) -> Manifest | None:
-    """Return the manifest of a folder; None if the folder is empty or missing.
+    """Return the manifest in a folder; None if the folder is missing or empty.
 
-    Raises SpecError if it belongs to another study or contains something else.
+    A lock and temporary files do not count. Raises SpecError if it belongs to another study (its
+    digest differs; the changed parts are named), has a damaged manifest, or contains something
+    else.
     """
     if (folder / MANIFEST_NAME).exists():
         stored = read_manifest(folder)
@@ -177,9 +191,10 @@ def require_same_study(folder: Path, manifest: Manifest) -> Manifest | None:
 
 
 def read_store(folder: Path) -> Store:
-    """Open a store for reading.
+    """Open a store for reading; blocks may be missing.
 
-    Raises SpecError, also for a damaged block, and MissingToolError.
+    Raises SpecError for an invalid manifest, for the problems of `scan` and for a damaged block;
+    MissingToolError without pyarrow.
     """
     import_arrow()
     store = Store(folder, read_manifest(folder))
@@ -195,7 +210,8 @@ def read_store(folder: Path) -> Store:
 def lock_folder(folder: Path) -> Iterator[None]:
     """Lock a folder against writing by other processes; the lock ends with the context or process.
 
-    Raises SpecError if another process has the lock. Systems without fcntl have no lock.
+    The folder and the file LOCK_NAME in it are created. Raises SpecError if another process has the
+    lock. Systems without fcntl have no lock.
     """
     folder.mkdir(parents=True, exist_ok=True)
     try:

@@ -30,7 +30,7 @@ class PooledColumn:
 
 
 def to_display_unit(values: Values, column: StoreColumn) -> Values:
-    """Return values [SI] in the display unit of their column."""
+    """Return values [SI] in the display unit of their column: (value - offset) / factor."""
     with np.errstate(over="ignore"):
         return (values - column.offset) / column.factor
 
@@ -42,7 +42,10 @@ class StudyTable:
     store: Store
 
     def read_reals(self, name: str) -> Reals:
-        """Return a column (n_variants,) as floats; NaN for missing and infinite values."""
+        """Return a column (n_variants,) as floats; NaN for missing and infinite values.
+
+        A truth value is 0 or 1. Texts and lists cannot be read.
+        """
         parts = [
             np.asarray(part.cast("float64").to_numpy(zero_copy_only=False), dtype=np.float64)
             for part in self._read_parts(name)
@@ -51,7 +54,10 @@ class StudyTable:
         return np.where(np.isfinite(found), found, np.nan)
 
     def read_pooled(self, name: str) -> PooledColumn:
-        """Return all finite numbers of a column of reals, integers or lists."""
+        """Return all numbers of a column of reals, integers, truth values or lists.
+
+        Missing and infinite values are left out; the elements of lists are not checked.
+        """
         if next((c.type for c in self.store.manifest.measures if c.name == name), "") != "list":
             values = self.read_reals(name)
             rows = np.flatnonzero(~np.isnan(values))
@@ -82,13 +88,13 @@ class StudyTable:
 
     @cached_property
     def counts(self) -> dict[str, int]:
-        """The number of variants by status."""
+        """The number of stored variants by status; a status that does not occur is absent."""
         places, names = self.read_categories("status")
         return {name: int(np.sum(places == k)) for k, name in enumerate(names)}
 
     @cached_property
     def is_done(self) -> NDArray[np.bool_]:
-        """Mask (n_variants,) of the finished variants, whose measures count."""
+        """Mask (n_variants,) of the variants with the status `done`, whose measures count."""
         places, names = self.read_categories("status")
         return places == names.index(DONE) if DONE in names else np.zeros(len(places), dtype=bool)
 
