@@ -57,10 +57,12 @@ def instrument(program: Program, decisions: Iterable[Decision]) -> InstrumentedP
 
     Decisions with more than MAX_CONDITIONS conditions, and guards whose lowered form does not
     match, are not recorded. The pass adds a store after (continuous) or before (sampled) each
-    guard:
+    guard::
 
         work.guard = a and b   ->   work.guard = a and b
                                     probe.k[(a ? 1 : 0) + (b ? 2 : 0)] = true
+
+    A continuous Program also gets the block GUARD_READ_BLOCK, a chart the arrays `reached_array`.
     """
     inserter = _ProbeInserter(program, tuple(decisions))
     blocks = dict(program.blocks)
@@ -95,7 +97,10 @@ def instrument(program: Program, decisions: Iterable[Decision]) -> InstrumentedP
 
 
 def reached_array(region: str) -> str:
-    """Return the name of the array of modes of a region that were active after a micro-step."""
+    """Return the name of the array of modes of a region that were active after a micro-step.
+
+    It is `reached.mode`, with the suffix that `mode_variable` gives to a parallel region.
+    """
     return mode_variable("reached.mode", region)
 
 

@@ -66,7 +66,9 @@ RANGE_REASON = "{} was outside its range"
 def fault_reason(program: Program, fault: str) -> str:
     """Return the comment that tells why a fault bit is set.
 
-    For a fault of a range it names the signals. A fault that the spec declares has an empty text.
+    A fault of the product has its text in FAULT_REASONS. For a fault of a range it is RANGE_REASON
+    with the names of the signals, joined with ` or `. Any other fault (one that the spec declares)
+    has an empty text.
     """
     if fault in FAULT_REASONS:
         return FAULT_REASONS[fault]
@@ -100,11 +102,11 @@ INLINE_FUNCTIONS = ("min", "max", "clip", "sign", "pow2", "whole", "within", "lo
 def emit_c_files(
     program: Program, by_magnitude: bool = True, fast_path: FastPathMode = "on"
 ) -> dict[str, str]:
-    """Return the C files of a Program by name: header, memory map, source, ha_math if used.
+    """Return the C files of a Program by name: `X.h`, `X_MemMap.h`, `X.c`, ha_math if it is used.
 
-    `by_magnitude` is passed to `merge_range_checks`, `fast_path` to `add_fast_path`. Raises
-    ValueError for a Program without a block `step`: an input of a continuous automaton varies
-    inside a step.
+    `by_magnitude` is passed to `merge_range_checks`, `fast_path` to `add_fast_path`. The files
+    contain the digest of the given Program, before any pass. Raises ValueError for a Program
+    without a block `step`, which is one of a continuous automaton whose inputs vary inside a step.
     """
     if "step" not in program.blocks:
         raise ValueError(f"inputs of {program.name} vary inside a step: it has no C")
@@ -127,8 +129,8 @@ def run_c_passes(
 ) -> Program:
     """Return the Program that is printed as C, after the passes of the C generator (rule C18).
 
-    The passes are `restrict_to_step`, `remove_dead_stores`, `merge_range_checks` and
-    `add_fast_path`. They keep the bits of all results.
+    The passes are, in this order, `restrict_to_step`, `remove_dead_stores` (of `work.` variables),
+    `merge_range_checks` and `add_fast_path`. They keep the bits of all results.
     """
     return add_fast_path(
         merge_range_checks(remove_dead_stores(restrict_to_step(program), ("work.",)), by_magnitude),
@@ -139,8 +141,8 @@ def run_c_passes(
 def restrict_to_step(program: Program) -> Program:
     """Return a Program without what its C does not execute.
 
-    A continuous Program keeps what its entry points run. A sampled Program loses its invariants
-    (rule 11b).
+    A continuous Program (`period` is None) keeps what the blocks of ENTRY_BLOCKS reach. A sampled
+    Program loses only the block and the variables of its invariants (rule 11b).
     """
     if program.period is None:
         return finalise_program(program, ENTRY_BLOCKS)
@@ -150,7 +152,12 @@ def restrict_to_step(program: Program) -> Program:
 
 
 def module_context(program: Program, page_layout: PageLayout = HOST_PAGE) -> dict[str, Any]:
-    """Return the context of the templates of a module: names, structures, functions and flags."""
+    """Return the context of the templates of a module: names, structures, functions and flags.
+
+    `program` has passed `run_c_passes`. The layout of the page decides whether solved numbers are
+    members of the page or constants of the file. Functions are in an order in which callees come
+    first; those of ENTRY_BLOCKS are in `entries` by name, all others in `blocks`.
+    """
     number = program.number_type
     loop_variables = loop_locals(program)
     local = locals_of(program, loop_variables)

@@ -76,10 +76,11 @@ class CNames:
                 return f"self->{group}.{rest}"
 
     def integer_constant(self, name: str, number: int) -> str:
-        """Return the C text of a number that stands beside a whole-number variable.
+        """Return the C text of a number that is compared with or assigned to the variable `name`.
 
-        Modes, transitions and enumeration values have named constants. Any other number is decimal,
-        with the suffix U beside an unsigned counter.
+        Modes, transitions and enumeration values have named constants. Any other number, also one
+        outside the enumeration, is decimal, with the suffix U beside a variable of
+        UNSIGNED_PREFIXES. Raises StopIteration for a mode number that the Program does not have.
         """
         if name == "memory.mode":
             return mode_constant(self.program, number)
@@ -96,7 +97,11 @@ class CNames:
         return f"{number}U" if name.startswith(UNSIGNED_PREFIXES) else str(number)
 
     def is_unsigned(self, name: str) -> bool:
-        """Tell whether a variable or constant is an unsigned integer in C."""
+        """Tell whether a variable or constant is an unsigned integer in C.
+
+        These are variables whose C type begins with `uint` and constants in ticks; False for an
+        unknown name.
+        """
         return name in self._unsigned_variables
 
     @cached_property
@@ -122,8 +127,8 @@ class CNames:
 def c_member(name: str) -> str:
     """Return the name of a member or local: without its group, with underscores for dots.
 
-    In the name of a solved matrix entry two underscores separate row and column:
-    `drive_L_w_em__y_w`.
+    The group is the part before the first dot. In the name of a solved matrix entry two underscores
+    separate row and column: `solved.drive_L.w_em.y_w` is `drive_L_w_em__y_w`.
     """
     matrix, *entry = unqualified_name(name).split(".")
     apart = "__" if name.startswith("solved.") else "_"
@@ -131,9 +136,11 @@ def c_member(name: str) -> str:
 
 
 def c_type(variable: Variable | Constant, number: NumberType) -> str:
-    """Return the C type of a variable or constant.
+    """Return the C type of a variable or constant (rule C10).
 
-    Reals have the type of the number type (rule C10).
+    Reals have the type of `number`, truth values bool, enumerations uint8_t, timers, values in
+    ticks and transition numbers uint16_t, the fault word uint32_t, modes int16_t, other whole
+    numbers int32_t.
     """
     if variable.type == "real":
         return C_REAL_TYPE[number]
@@ -151,7 +158,11 @@ def c_type(variable: Variable | Constant, number: NumberType) -> str:
 
 
 def mode_constant(program: Program, number: int, region: str = CHART) -> str:
-    """Return the name of the C constant of a mode (rule C9)."""
+    """Return the name of the C constant of a mode: `<program>_MODE_<mode>` (rule C9).
+
+    For a parallel region, the name of the region stands for MODE. Dots become underscores. Raises
+    StopIteration for an unknown number or region.
+    """
     where = "MODE" if region == CHART else region
     return f"{program.name}_{where}_{program.mode_name(number, region)}".replace(".", "_")
 
@@ -159,8 +170,9 @@ def mode_constant(program: Program, number: int, region: str = CHART) -> str:
 def transition_constants(program: Program) -> dict[int, str]:
     """Return the names of the C constants of all transitions by number.
 
-    A name consists of the source and the name of the transition. If several transitions have the
-    same name, the number is appended.
+    A name is `<program>_FIRED_<source>_<name>` with underscores for dots; the source mode has its
+    region before it in a parallel region. If several transitions have the same name, `_<number>` is
+    appended to each.
     """
     names = {info.number: _transition_constant(program, info) for info in program.transitions}
     count = Counter(names.values())
@@ -178,13 +190,20 @@ def _transition_constant(program: Program, info: TransitionInfo) -> str:
 
 
 def run_mode_constant(program: Program, number: int) -> str:
-    """Return the name of the C constant of a mode of the model that a run integrates."""
+    """Return the name of the C constant of a run mode: `<program>_RUN_<mode>`.
+
+    A run mode is a mode of the model that a run integrates. Raises StopIteration for an unknown
+    number.
+    """
     name = next(mode.name for mode in program.run_modes if mode.number == number)
     return f"{program.name}_RUN_{name}"
 
 
 def enumerations(program: Program) -> list[tuple[str, tuple[str, ...]]]:
-    """Return each list of enumeration values once, with the member name of the first owner."""
+    """Return each nonempty list of enumeration values once, with the name of its first owner.
+
+    Owners are the constants, then the variables, in Program order; the name is that of `c_member`.
+    """
     owner_by_values: dict[tuple[str, ...], str] = {}
     for name, values in _enumeration_lists(program):
         if values:
@@ -193,7 +212,11 @@ def enumerations(program: Program) -> list[tuple[str, tuple[str, ...]]]:
 
 
 def value_constant(program: Program, values: tuple[str, ...], number: int) -> str:
-    """Return the name of the C constant of an enumeration value."""
+    """Return the name of the C constant of an enumeration value: `<program>_<owner>_<value>`.
+
+    The owner is that of `enumerations`; `number` is an index of `values`. Raises StopIteration if
+    no constant or variable has these values.
+    """
     owner = next(name for name, known in enumerations(program) if known == values)
     return f"{program.name}_{owner}_{values[number]}"
 

@@ -70,8 +70,9 @@ OPTIONAL = re.compile(r"\[(.*?)\]")
 def describe_function(block: str, modes: Iterable[str] = (), run_modes: Iterable[str] = ()) -> str:
     """Return the comment of the function of a block; an empty text for an unknown name.
 
-    The entry of PURPOSES with the most words wins. If the rest of the name is a mode and a run
-    mode, separated by `_`, the comment names both.
+    The entry of PURPOSES that is the longest prefix of the name, in words separated by `_`, is
+    taken; the rest of the name replaces `{}`. If the rest is a mode and a run mode, separated by
+    `_`, the comment names both.
     """
     both = {f"{m}_{r}": f"{m} with the model in {r}" for m in modes for r in run_modes}
     words = block.split("_")

@@ -96,7 +96,7 @@ class ModeConfiguration:
 
     @property
     def known_values(self) -> dict[str, Expr]:
-        """The values of the mode variables in this configuration, as expressions."""
+        """The numbers of the active modes as literal expressions, by mode variable."""
         return {variable: Value(number) for variable, number in self.mode_numbers}
 
 
@@ -104,10 +104,10 @@ def add_fast_path(program: Program, fast_path: FastPathMode = "on") -> Program:
     """Return a Program with a fast path for a step without an event.
 
     For a continuous Program the fast path is that of its own step, for a sampled one that of the
-    model that it runs. With "off" the Program is returned as it is. So is a sampled float64
-    Program: on an ECU with float32 hardware its values would be on the stack. A mode whose path
-    cannot be specialised, for example one with a wait, always takes the general path; a mode
-    without a guard never does.
+    model that it runs. The Program is returned unchanged with "off", if it is sampled and float64
+    (on an ECU with float32 hardware its values would be on the stack), and if no mode can be
+    specialised. A mode whose path cannot be specialised, for example one with a wait, always takes
+    the general path. If no mode has a guard, there is no general path in the step.
     """
     if fast_path == "off":
         return program
@@ -165,8 +165,9 @@ def _fallback(event_path: str) -> Block:
 def mode_configurations(program: Program, prefix: str) -> Iterator[ModeConfiguration]:
     """Yield the mode configurations of a Program: all combinations of the modes of its regions.
 
-    Yields nothing for a Program with regions and more than MAX_CONFIGURATIONS combinations. Names
-    of blocks begin with `prefix`.
+    The last region varies fastest. The block name of a configuration is `prefix` and, for each
+    region, `_` and the name of its mode. Yields nothing for a Program with parallel regions and
+    more than MAX_CONFIGURATIONS combinations.
     """
     names = program.mode_variables()
     by_region = [

@@ -33,8 +33,9 @@ def select_noinline_blocks(program: Program) -> frozenset[str]:
     """Return the names of the blocks whose functions are not inlined (rule C23).
 
     A continuous automaton has none; in float32 only blocks of ALWAYS_NOINLINE are returned. In
-    float64 these are blocks with at least MIN_OPERATIONS floating-point operations, except those
-    with exactly one call site, in a block of the same kind.
+    float64 also blocks with at least MIN_OPERATIONS floating-point operations and, if one of
+    ALWAYS_NOINLINE exists, those of NOINLINE_WITH_COVARIANCE. Of all these, one is left out if it
+    has exactly one call site, in another of them; a call in a loop counts as more than one.
     """
     if program.period is None:
         return frozenset()

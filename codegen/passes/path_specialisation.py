@@ -76,15 +76,16 @@ class ExecutionPath:
 
     @property
     def is_unconditional(self) -> bool:
-        """Tell whether the path has no guards."""
+        """Tell whether the path has no guards: `is_event_free` is the literal true."""
         return self.is_event_free == Value(True)
 
     def reuse_equations(self, equations: Block, constant_groups: tuple[str, ...]) -> None:
         """Record the values of equations that are still valid from the end of the step before.
 
-        An equation is reused if it reads only names in `constant_groups`, other reused equations
-        and functions. A calibration page may change between two steps, so its parameters are not
-        among them.
+        `constant_groups` are prefixes of names. An assignment is reused if it reads only names with
+        such a prefix, targets reused before it, and functions. A calibration page may change
+        between two steps, so callers do not name its parameters. Other operations are skipped;
+        nothing is appended to `ops`.
         """
         reused = set[str]()
         for op in equations:
@@ -102,8 +103,10 @@ class ExecutionPath:
     def follow(self, block: Block) -> None:
         """Append the operations of a block to the path, with known values folded.
 
-        Raises NotSpecialisable if a switch, branch, loop or other operation depends on unknown
-        values.
+        Blocks that it runs are followed in place. A switch on a mode without a case adds nothing. A
+        branch on an unknown condition is kept if its arms assign only persistent variables;
+        otherwise both arms must have the same effect. Raises NotSpecialisable if not, if a selector
+        or a work variable is unknown, if a loop does not come to rest, and for any other operation.
         """
         for op in block:
             match op:
@@ -125,10 +128,11 @@ class ExecutionPath:
                     raise NotSpecialisable
 
     def follow_step_end(self) -> None:
-        """Append the equations at the end of a step.
+        """Append the equations at the end of a step: those of the block `equations`.
 
-        Transitions run before them if an event occurred. If the equations cannot be specialised,
-        the block is run as it is.
+        If `work.event` may be true, they stand in a branch whose other arm runs the transitions
+        (`macro_step`) first. If the equations cannot be specialised, their block is run as it is.
+        Raises NotSpecialisable if `work.event` is unknown.
         """
         event, begin = self._resolve(Ref("work.event")), len(self.ops)
         try:

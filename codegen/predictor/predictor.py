@@ -43,7 +43,8 @@ REMOVABLE_GROUPS = ("equation.", "work.")
 def slice_to_outputs(program: Program) -> Program:
     """Return the Program that C executes, without equations that neither it nor an output reads.
 
-    If the removal would change the tunable parameters or inputs, they are kept.
+    It is `restrict_to_step`, then `remove_dead_stores` for REMOVABLE_GROUPS. If that would change
+    the tunable parameters or the retained inputs (`before.`), nothing is removed.
     """
     step_program = restrict_to_step(program)
     sliced = remove_dead_stores(step_program, REMOVABLE_GROUPS)
@@ -62,7 +63,11 @@ def _external_interface(program: Program, step_program: Program) -> tuple[object
 
 
 def load_predictor_library(path: Path) -> Any:
-    """Load the shared library of a predictor (codegen/templates/predictor/predictor.c.jinja)."""
+    """Load the shared library of a predictor and declare the types of its four functions.
+
+    They are those of codegen/templates/predictor/predictor.c.jinja. Raises OSError if it cannot be
+    loaded.
+    """
     library = ctypes.CDLL(str(path))
     pointer, whole = ctypes.c_void_p, ctypes.c_long
     library.modewright_differences.argtypes = [
@@ -127,7 +132,10 @@ class PredictorColumns:
 
 
 def columns_of(program: Program, outputs: Sequence[str]) -> PredictorColumns:
-    """Return the columns of a Program; `outputs` are those that are compared with recordings."""
+    """Return the columns of a Program, without the groups of the names, in Program order.
+
+    `outputs` are the names of the outputs that are compared with recordings; their order is kept.
+    """
     return PredictorColumns(
         program.name,
         tuple(unqualified_name(v.name) for v in program.variables if v.name.startswith("state.")),
@@ -165,9 +173,9 @@ class Predictor:
         """Return the Jacobians of a prediction over `substeps` major steps, by central differences.
 
         They are d states / d states (states, states), d outputs / d states (outputs, states), and d
-        states / d inputs (states, inputs), at `states` (states,) in a mode, with `inputs` (inputs,)
-        held constant and the parameters `page` (tunables,). `state_steps` (states,) and
-        `input_steps` (inputs,) are the step sizes of the differences.
+        states / d inputs (states, inputs), at `states` (states,) in the mode with the number
+        `mode`, with `inputs` (inputs,) held constant and the parameters `page` (tunables,).
+        `state_steps` (states,) and `input_steps` (inputs,) are the step sizes of the differences.
         """
         count = len(self.states)
         next_states, outputs = np.empty((count, count)), np.empty((count, len(self.outputs)))
@@ -191,7 +199,11 @@ class Predictor:
         transient_samples: int,
         max_samples: int = MAX_SAMPLES,
     ) -> tuple[Reals, Reals, Reals] | None:
-        """Return the Kalman gains of a linear model; see `compute_kalman_gains`."""
+        """Return transient gains, the steady-state gain and the last covariance of a linear model.
+
+        Returns None if a gain exceeds all bounds. Arguments and shapes are those of
+        `compute_kalman_gains`, which it calls; the library of the predictor is not used.
+        """
         return compute_kalman_gains(
             phi, c, q, r, initial_covariance, transient_samples, max_samples
         )
@@ -214,7 +226,7 @@ class Predictor:
         to the first samples, `gains` (modes, states, outputs) to all others. `substeps` is the
         number of major steps from sample to sample. With `is_first_order_hold` inputs are linear
         between samples, else constant. `state_increments` (samples, states) are added to the
-        corrected states.
+        corrected states. After a divergence `completed` is smaller than the number of samples.
         """
         samples = len(inputs)
         innovations = np.full((samples, len(self.outputs)), np.nan)
@@ -252,7 +264,8 @@ class Predictor:
 
         `pages` (recordings, tunables) holds a row of parameters for each recording. Innovations
         beyond `limits` (outputs,) count linearly in the sums of squares, as in `sum_squares`. The
-        other arguments are those of `predict`.
+        other arguments are those of `predict`. Innovations and outputs are NaN in the samples of a
+        recording that follow the one in which a state diverged.
         """
         samples = len(recordings.inputs)
         stacked = Prediction(
@@ -278,12 +291,12 @@ class Predictor:
         gains: Reals,
         substeps: int,
     ) -> tuple[Reals, NDArray[np.int64]]:
-        """Return the innovations of several recordings at several parameter points.
+        """Return the innovations of several recordings at several points of the parameter space.
 
-        `pages` has the shape (points, recordings, tunables). Returns innovations (points, samples,
-        outputs), with NaN after a divergence, and the number of completed samples (points,
-        recordings). The gains may have points as an additional first axis; the other arguments are
-        those of `predict`.
+        `pages` (points, recordings, tunables) holds the parameters of each recording at each point.
+        Returns innovations (points, samples, outputs), with NaN after the sample in which a state
+        diverged, and the number of completed samples (points, recordings). Both gains may have
+        points as an additional first axis; the other arguments are those of `predict`.
         """
         points = len(pages)
         innovations = np.empty((points, len(recordings.inputs), len(self.outputs)))
@@ -302,7 +315,7 @@ class Predictor:
 
         `innovations` has the shape (samples, outputs). An innovation e beyond its limit L in
         `limits` (outputs,) counts as L (2 |e| - L) (Huber 1964). Samples of the burn-in and NaN are
-        left out.
+        left out of both.
         """
         shape = (len(recordings.is_first_order_hold), len(self.outputs))
         squares, counts = np.empty(shape), np.empty(shape)
@@ -359,7 +372,9 @@ def _address(values: NDArray[Any]) -> int:
 def build_predictor(program: Program, columns: PredictorColumns) -> Iterator[Path]:
     """Yield the path of the compiled library of a Program, from the cache if it was built before.
 
-    Raises MissingToolError, BuildError.
+    The library is that of `slice_to_outputs`; it follows several recordings at once (SIMD) if the
+    compiler has GCC's vectors and the Program can be vectorised. If the cache cannot be used, the
+    path is in a temporary folder that is removed at the end. Raises MissingToolError, BuildError.
     """
     program = slice_to_outputs(program)
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:

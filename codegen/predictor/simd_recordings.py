@@ -56,8 +56,10 @@ def simd_recordings_context(
 ) -> Any:
     """Return the context of the template of vectorised recordings.
 
-    Returns None if no step can be vectorised. `states` are the names of the states, `outputs` those
-    of the compared outputs. Only float64 Programs are vectorised.
+    `states` are the names of the states, `outputs` those of the compared outputs. Returns None for
+    float32, if no mode configuration has a step that can be vectorised, if a compared output is no
+    real or a work variable, or if delays are recorded and the work variables of a step are not in
+    the instance.
     """
     if program.number_type != "float64":
         return None

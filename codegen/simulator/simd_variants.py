@@ -70,7 +70,11 @@ class VectorEmitter:
     """C names and kinds of local values, which replace names of the Program."""
 
     def emit_block(self, name: str, ops: Block) -> None:
-        """Print a block and those that it runs into `blocks`, unless it is there already."""
+        """Print a block and those that it runs into `blocks`, unless it is there already.
+
+        Only assignments whose two sides have one kind, and calls of blocks, can be printed; raises
+        NotVectorisable for others.
+        """
         if name not in self.blocks:
             self.blocks[name] = [f"    {line}" for op in ops for line in self._emit_op(op)]
 
@@ -91,7 +95,10 @@ class VectorEmitter:
                 raise NotVectorisable
 
     def vector_member(self, name: str) -> str:
-        """Return the C text of the vector of a name, and record the access."""
+        """Return the C text of the vector of a name, `all-><flat name>`, and add it to `accessed`.
+
+        Raises NotVectorisable if the name has no kind.
+        """
         self.accessed.setdefault(name, self.kind_of(Ref(name)))
         return f"all->{flatten_name(name)}"
 
@@ -116,9 +123,11 @@ class VectorEmitter:
         raise NotVectorisable
 
     def emit_expression(self, expr: Expr) -> str:
-        """Return the C text of an expression over vectors.
+        """Return the C text of an expression over vectors, and record its names and functions.
 
-        Raises NotVectorisable if there is none.
+        Literals and names in `fixed` become vectors of equal lanes, choices the macros CHOSEN and
+        CHOSEN_TRUTH, calls `each_<function>`. Raises NotVectorisable for whole numbers, elements of
+        tables, and comparisons of truth values other than == and !=.
         """
         match expr:
             case Value(value) if isinstance(value, bool):
@@ -168,7 +177,9 @@ def flatten_name(name: str) -> str:
 def simd_batch_context(program: Program, row_slots: list[tuple[int, str]]) -> dict[str, Any] | None:
     """Return the template context of SIMD steps; None if a step cannot be vectorised.
 
-    `row_slots` are pairs of a slot in a row and the variable that fills it.
+    That is the case for float32, invariants, regions, delays, waits, monitored ranges of other
+    variables than states and discrete ones, and blocks that are not arithmetic of reals and truth
+    values. `row_slots` are pairs of a slot in a row and the variable that fills it.
     """
     try:
         return _BatchBuilder(program, row_slots).context()

@@ -48,7 +48,11 @@ from language.programs.simulation_assembly import (
 
 
 def emit_simulator_files(assembly: SimulationAssembly, simd_batch: bool = True) -> dict[str, str]:
-    """Return the C files of a system's simulation by name; with `simd_batch` also SIMD steps."""
+    """Return the C files of a system's simulation by name; with `simd_batch` also SIMD steps.
+
+    They are `run.h`, `run.c`, for each instance `i_<instance>.h` and `i_<instance>_run.c`, and
+    ha_math for each number type that uses it.
+    """
     programs = {
         name: _instance_program(name, program) for name, program in assembly.programs.items()
     }
