@@ -103,11 +103,11 @@ class VectorEmitter:
         return f"all->{flatten_name(name)}"
 
     def kind_of(self, expr: Expr) -> LaneKind:
-        """Return the kind of an expression: "truth" for logic and comparisons, else that of its operands.
+        """Return the kind of an expression.
 
-        Of a choice the `then` value decides; a call is "real". Raises NotVectorisable for whole
-        numbers, unknown names, elements of tables, the functions `real` and `whole`, and calls with
-        a truth value.
+        It is "truth" for logic and comparisons, else that of its operands. Of a choice the `then`
+        value decides; a call is "real". Raises NotVectorisable for whole numbers, unknown names,
+        elements of tables, the functions `real` and `whole`, and calls with a truth value.
         """
         match expr:
             case Value(value) if isinstance(value, bool):
