@@ -213,7 +213,7 @@ def test_the_doctor_finds_everything_in_order_and_tests_itself(
     assert run("doctor", "--json") == 0
     found = {item["name"]: item for item in json.loads(capsys.readouterr().out)["findings"]}
     assert {item["verdict"] for item in found.values()} == {"ok"}
-    assert found["self-test"]["told"].endswith("values in engine and C, 0 differ")
+    assert found["self-test"]["message"].endswith("values in engine and C, 0 differ")
     assert {"python", "modewright", "numpy", "pyarrow", "C compiler", "cache"} <= set(found)
 
 
