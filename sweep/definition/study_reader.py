@@ -95,7 +95,8 @@ class _StudyReader(Reader):
         scenarios_by_system = {
             name: self._read_scenarios(system, scenarios) for name, system in systems.items()
         }
-        if not scenarios or any(len(each) < len(scenarios) for each in scenarios_by_system.values()):
+        known = scenarios_by_system.values()
+        if not scenarios or any(len(each) < len(scenarios) for each in known):
             self.problems.raise_if_errors()
         places = self._common_targets(systems, list(scenarios.values()))
         vary = VaryReader(self.problems, places, next(iter(systems.values())))
