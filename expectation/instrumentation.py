@@ -2,8 +2,8 @@
 
 The array `probe.<k>` has an element for each combination of the conditions of guard k. A sampled
 Program evaluates guards when it selects transitions. A continuous Program evaluates them also
-during the search for crossings; only jumps and output instants (block `look`) are recorded. A chart
-also records the active modes after each micro-step.
+during the search for crossings; only jumps and output instants (block `read_guards`) are recorded.
+A chart also records the active modes after each micro-step.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from language.ir.ops import (
 )
 from language.ir.program import Program, Variable, mode_variable
 
-GUARD_READ_BLOCK = "look"
+GUARD_READ_BLOCK = "read_guards"
 """The block that evaluates and records the guards of the active modes, without other effects."""
 COMMIT_BLOCK = "commit"
 """The block of a chart that ends a micro-step."""
@@ -40,7 +40,7 @@ PROBED_PREFIX = "probed_"
 """Prefix of the instrumented copies of these blocks."""
 SELECTION_PREFIXES = ("jump", "count_", "choose_")
 """Prefixes of the blocks of a sampled Program that evaluate guards."""
-FIRED_PREFIXES = ("memory.fired", "work.wish_")
+FIRED_PREFIXES = ("memory.fired", "work.request_")
 """Prefixes of the variables with the number of the selected or requested transition."""
 
 
@@ -75,7 +75,7 @@ def instrument(program: Program, decisions: Iterable[Decision]) -> InstrumentedP
         for name, block in program.blocks.items():
             if name.startswith("jump"):
                 blocks[name] = _map_operations(block, _redirect_to_probed)
-        blocks[GUARD_READ_BLOCK] = tuple(_guard_reads(program.blocks["watch"]))
+        blocks[GUARD_READ_BLOCK] = tuple(_guard_reads(program.blocks["evaluate_guards"]))
     else:
         for name, block in program.blocks.items():
             if name.startswith(SELECTION_PREFIXES):
@@ -174,7 +174,7 @@ def _redirect_to_probed(op: Op) -> Iterator[Op]:
 
 
 def _guard_reads(block: Sequence[Op]) -> Iterator[Op]:
-    """Yield the operations of `watch` that evaluate guards, without stores to lasting variables."""
+    """Yield the evaluations of guards in `evaluate_guards`, without stores to lasting variables."""
     for op in block:
         match op:
             case Assign(target, _, _) if target.startswith("work."):

@@ -83,7 +83,7 @@ def fault_reason(program: Program, fault: str) -> str:
 ENTRY_BLOCKS = ("init", "derive", "step")
 """The blocks that are entry points of a module."""
 
-COLD_BLOCKS = (LATCH_EACH, EVENT_PATH, "back_")
+COLD_BLOCKS = (LATCH_EACH, EVENT_PATH, "rollback_")
 """Prefixes of blocks that run rarely and are not inlined."""
 
 NOT_INLINED = {

@@ -24,7 +24,7 @@ C_REAL_TYPE: Mapping[NumberType, str] = {"float64": "double", "float32": "float"
 """The C type of a real by the number type."""
 MODE_PREFIXES = ("memory.mode", "memory.run_mode")
 """Prefixes of variables that hold the number of a mode."""
-TRANSITION_PREFIXES = ("memory.fired", "memory.log", "work.wish_", "work.takes_")
+TRANSITION_PREFIXES = ("memory.fired", "memory.log", "work.request_", "work.selected_")
 """Prefixes of variables that hold the number of a transition."""
 UNSIGNED_PREFIXES = ("timer.", "memory.faults", *TRANSITION_PREFIXES)
 """Prefixes of variables beside which a number is written with the suffix U."""

@@ -2,24 +2,24 @@
 
   before                      after
   block step                  block step
-      if memory.started           memory.is_leapt := False
+      if memory.started           memory.is_fast_path_taken := False
           <flow>                  if memory.started
-      else                            run leap
-          <enter>                 if (not memory.is_leapt)
+      else                            run fast_path
+          <enter>                 if (not memory.is_fast_path_taken)
       <end of the step>               run through_events
-                              block leap
+                              block fast_path
                                   when memory.mode is 1
-                                      run leap_<mode>
-                              block leap_<mode>
+                                      run fast_path_<mode>
+                              block fast_path_<mode>
                                   <values up to the guards>
                                   if <no guard changed>
                                       <states and equations at the end of the step>
-                                      memory.is_leapt := True
+                                      memory.is_fast_path_taken := True
                               block through_events
                                   <the block step of before>
 
 In most steps of a continuous automaton no guard changes; the same holds for most ticks that run a
-model. Block `leap_<mode>` executes such a step. It is specialised to what is known of it: its
+model. Block `fast_path_<mode>` executes such a step. It is specialised to what is known of it: its
 length, its mode, and that it has no inner event. Each value has its own name, so a compiler keeps
 it in a register. Equations whose values at the end of the step before are still valid are not
 computed again. If a guard changed, `through_events` executes the step from its beginning. The bits
@@ -67,8 +67,8 @@ states are set between steps, as in a predictor, so that values of the step befo
 ENTRY_BLOCKS = ("init", "derive", "step")
 """The blocks that are entry points of a module."""
 FAST_PATH, FAST_PATH_TAKEN, RECORD_BLOCK, STARTED = (
-    "leap",
-    "memory.is_leapt",
+    "fast_path",
+    "memory.is_fast_path_taken",
     "record",
     "memory.started",
 )

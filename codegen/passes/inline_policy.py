@@ -19,7 +19,7 @@ ARITHMETIC = ("+", "-", "*", "/")
 """Operators whose floating-point operations are counted."""
 MIN_OPERATIONS = 3
 """Number of floating-point operations from which on a call costs little in comparison."""
-ALWAYS_NOINLINE = ("hold", "rows_", "columns_")
+ALWAYS_NOINLINE = ("saturate_states", "rows_", "columns_")
 """Prefixes of blocks that are never inlined, in any number type: a covariance does not fit into
 registers."""
 

@@ -141,7 +141,7 @@ class ExecutionPath:
             self.ops[begin:] = [RunBlock("equations")]
         if event != Value(False):
             now = tuple(self.ops[begin:])
-            self.ops[begin:] = [Branch(event, (RunBlock("settle"), RunBlock("equations")), now)]
+            self.ops[begin:] = [Branch(event, (RunBlock("macro_step"), RunBlock("equations")), now)]
 
     def _assign(self, target: str, value: Expr, key: str) -> None:
         """Append an assignment and record the value of its target.

@@ -389,7 +389,7 @@ def build_predictor(program: Program, columns: PredictorColumns) -> Iterator[Pat
         )
         context = {
             **_template_context(columns),
-            "tracks": simd_context,
+            "simd": simd_context,
             "mathematics": next((f for f in files if MATH_SOURCE.match(f)), ""),
         }
         files["predictor.c"] = render("predictor/predictor.c.jinja", context)

@@ -156,7 +156,7 @@ def _template_context(
             for name, count in emitter.called_functions.items()
             if name not in (*functions, *TEMPLATE_FUNCTIONS)
         ],
-        "leaps": steps,
+        "fast_steps": steps,
     }
 
 

@@ -90,7 +90,7 @@ class VectorEmitter:
                 )
             case RunBlock(inner):
                 self.emit_block(inner, self.program.blocks[inner])
-                yield f"abreast_{inner}(all);"
+                yield f"simd_{inner}(all);"
             case _:
                 raise NotVectorisable
 
@@ -206,7 +206,7 @@ class _BatchBuilder:
             or len(program.mode_variables()) != 1
         ):
             raise NotVectorisable
-        if "record" in program.blocks or program.blocks["load"]:
+        if "record" in program.blocks or program.blocks["restart_waits"]:
             raise NotVectorisable
         if not all(
             one.name.startswith(("state.", "discrete.")) for one in range_event_variables(program)

@@ -60,7 +60,7 @@ def emit_simulator_files(assembly: SimulationAssembly, simd_batch: bool = True) 
     modules = {
         name: {
             **simulator_module_context(assembly, name, program, signal_names, flow),
-            "abreast": simd_batch_of(assembly, name, program, signal_names) if simd_batch else None,
+            "simd": simd_batch_of(assembly, name, program, signal_names) if simd_batch else None,
         }
         for flow, (name, program) in enumerate(programs.items())
     }
@@ -104,7 +104,7 @@ def _driver_context(
     instances = [
         {
             **_instance_context(assembly, name, program, signal_names),
-            "is_abreast": bool(modules[name]["abreast"]),
+            "has_simd": bool(modules[name]["simd"]),
         }
         for name, program in programs.items()
     ]
@@ -120,7 +120,7 @@ def _driver_context(
         "sensors": sensors,
         "seen": [seen for part in instances for flag in part["flags"] for seen, _ in flag["seen"]],
         "width": row_width(assembly),
-        "lanes": LANES if any(one["is_abreast"] for one in instances) else 0,
+        "lanes": LANES if any(one["has_simd"] for one in instances) else 0,
         "inputs": len(assembly.inputs),
         "has_lag": has_lag,
         "uses_math": has_lag or bool(called),

@@ -80,7 +80,7 @@ class ContinuousRun:
     def start(self) -> None:
         """Set the states to their initial values.
 
-        `settle` then enters the initial mode (rule 16).
+        `macro_step` then enters the initial mode (rule 16).
         """
         self._records.start()
         self.stepper.run("latch")
@@ -91,9 +91,9 @@ class ContinuousRun:
     def flow_to(self, time: Fraction, sample_times: Sequence[Fraction] = ()) -> None:
         """Advance to `time` [s] through every event before it. Raises SimulationStopped.
 
-        An event at `time` itself is left to `settle`, because inputs that step there come first.
-        The outputs are sampled at `sample_times`, which lie before `time` and have no influence on
-        the solution.
+        An event at `time` itself is left to `macro_step`: inputs that step there come first. The
+        outputs are sampled at `sample_times`, which lie before `time` and have no influence on the
+        solution.
         """
         self._looks = deque(sample_times)
         step = self.program.major_step
@@ -136,7 +136,7 @@ class ContinuousRun:
                     transition_event(self.name, self.program, info, float(self.time), micro_step)
                 )
         self._in_step += done
-        self.stepper.run("watch")
+        self.stepper.run("evaluate_guards")
         self.stepper.run("equations")
         self._ranges.check(self.time)
         self._invariants.check(self.time)
@@ -207,7 +207,7 @@ class ContinuousRun:
         self._around.interpolate_inputs(start, stop)
         stepper.run("latch")
         stepper.run("flow")
-        stepper.run("elapse")
+        stepper.run("advance_time")
         return self._arrive(end, (start, stop, states, age))
 
     def _arrive(self, end: Fraction, flow: FlowSegment | None = None) -> bool:

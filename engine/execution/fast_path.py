@@ -24,7 +24,11 @@ class FastPath:
         self._happened = stepper.make_reader(("work.event", "work.left"))
 
     def locate_step(self, time: Fraction) -> tuple[int, bool]:
-        """Return the index of the last major step up to a time [s], and whether time is later."""
+        """Return the index of the last major step that begins up to a time [s], and a flag.
+
+        The index is time divided by the major step, rounded down. The flag is whether time is not a
+        multiple of the step.
+        """
         step = self._step
         number, rest = divmod(time.numerator * step.denominator, time.denominator * step.numerator)
         return number, rest > 0
@@ -32,9 +36,10 @@ class FastPath:
     def advance(self, first: int, last: int) -> tuple[int, bool]:
         """Execute major steps from index `first` to `last`; return the index reached and a flag.
 
-        The flag is true if something happened in the step that begins there. Its first segment has
-        then been executed, that is the blocks `flow` and `elapse` have run. The inputs have to be
-        latched before the call.
+        The flag is false if all steps are executed; the index is then `last`. It is true if, in the
+        step that begins at the index, there is an event, the flow ended early or a value is out of
+        range. The first segment of that step has then been executed, that is the blocks `flow` and
+        `advance_time` have run. The inputs have to be latched before the call.
         """
         run, put, h = self._stepper.run, self._stepper.set, self._h
         is_inside, happened = self._ranges.is_inside, self._happened
@@ -42,7 +47,7 @@ class FastPath:
             put("work.left", h)
             run("limit")
             run("flow")
-            run("elapse")
+            run("advance_time")
             is_event, left = happened()
             if is_event or left > 0.0 or not is_inside():
                 return first, True

@@ -1,8 +1,8 @@
 """Scipy stepper: integrates the flow of a continuous Program with scipy.
 
 Of the Program, the vector field (`rates_<mode>`, `guards_<mode>`) and the blocks of instants
-(`init`, `equations`, `watch`, `jump`) are interpreted. Crossings are located by bisection on the
-dense output of scipy.
+(`init`, `equations`, `evaluate_guards`, `jump`) are interpreted. Crossings are located by
+bisection on the dense output of scipy.
 """
 
 from __future__ import annotations
@@ -41,13 +41,12 @@ INTEGRATION_BLOCKS = (
     "dense",
     "peek",
     "point",
-    "move_",
     "step",
     "series_",
     "locate_",
-    "look_",
+    "dense_guards_",
     "segment",
-    "settle",
+    "macro_step",
 )
 """Names, or prefixes of names, of the blocks that integrate or locate."""
 RTOL = 1e-11
@@ -75,7 +74,7 @@ BISECTIONS = 52
 
 
 def without_integration(program: Program) -> Program:
-    """Return a continuous Program without the blocks that integrate or locate."""
+    """Return a Program without the blocks whose names start with one of `INTEGRATION_BLOCKS`."""
     blocks = {
         n: block for n, block in program.blocks.items() if not n.startswith(INTEGRATION_BLOCKS)
     }
@@ -85,7 +84,8 @@ def without_integration(program: Program) -> Program:
 def evaluated_guard_slots(program: Program, mode: ModeInfo) -> tuple[str, ...]:
     """Return the slots of the guards that are evaluated in a mode of the chart, each once.
 
-    These are the guards of transitions from the mode and those of all parallel regions.
+    These are the guards of transitions from the mode and of all transitions of parallel regions, in
+    the order of the transitions.
     """
     infos = program.transitions
     slots = [i.slot for i in infos if i.region != CHART or i.source == mode.number]
@@ -124,15 +124,15 @@ class ScipyStepper:
             self._guards[mode.name] = (now, armed)
 
     def get(self, name: str) -> Any:
-        """Return the value of a variable or constant, `group.name`."""
+        """Return the value of a variable or constant, `group.name`, as `Interpreter.get`."""
         return self._inner.get(name)
 
     def set(self, name: str, value: float | int | bool) -> None:
-        """Set a variable."""
+        """Set a variable, `group.name`, as `Interpreter.set`."""
         self._inner.set(name, value)
 
     def make_reader(self, names: tuple[str, ...]) -> Callable[[], tuple[Any, ...]]:
-        """Return a function that returns the values of some variables, in their order."""
+        """Return a function that returns the present values of some names, in their order."""
         return self._inner.make_reader(names)
 
     def pop_range_violations(self) -> tuple[str, ...]:
@@ -142,7 +142,10 @@ class ScipyStepper:
     def run(self, block: str) -> None:
         """Run a block: `flow` and `peek` by scipy, all others by the interpreter.
 
-        `dense` does nothing, because `peek` integrates again.
+        `flow` advances the states by `work.h` [s] or to the first change of a guard, and sets
+        `work.elapsed` and `work.crossed`; `peek` advances them by `work.s`. `dense` does nothing,
+        because `peek` integrates again. Raises SimulationStopped if scipy fails or a state is not
+        finite.
         """
         if block == "flow":
             self._flow(self.get("work.h"))

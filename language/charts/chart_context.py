@@ -36,29 +36,38 @@ class ChartContext:
 
     @property
     def has_several_micro_steps(self) -> bool:
-        """Whether a tick may have more than one micro-step."""
+        """Whether a tick may have more than one micro-step (`micro_steps` of the chart)."""
         return self.chart.micro_steps > 1
 
     @property
     def may_reach_limit(self) -> bool:
-        """Whether a tick may end before all events or transitions are processed."""
+        """Whether a tick may end before all events or transitions are processed.
+
+        This is so with several micro-steps or with more than one place in the event queue.
+        """
         return self.has_several_micro_steps or self.queue_capacity > 1
 
     def mode_of(self, node: ChartNode) -> Mode | None:
-        """Return the mode of a node with its actions and transitions; None for a root region."""
+        """Return the mode of a node, with its actions and transitions.
+
+        The result is None for a node without one, such as the root of a region or a history node.
+        """
         return self.automaton.modes_by_key.get(node.mode_key)
 
     def info_of(self, transition: Transition) -> TransitionInfo:
-        """Return the number, timer and other data of a transition."""
+        """Return the number, timer and other data of a transition, by its key path."""
         return self.transition_infos[transition.key]
 
     def transitions_of(self, node: ChartNode) -> tuple[Transition, ...]:
-        """Return the transitions that leave a node; empty for a node without a mode."""
+        """Return the transitions that leave a node in file order; empty without a mode."""
         mode = self.mode_of(node)
         return mode.transitions if mode else ()
 
     def transitions_in(self, region: str) -> list[tuple[Transition, ChartTransition]]:
-        """Return the transitions whose source is in a region, each with its chart endpoints."""
+        """Return the transitions whose source node is in a region, each with its chart endpoints.
+
+        They are in the order of the nodes; nested regions are not included.
+        """
         nodes = (node for node in self.chart.nodes if node.region == region)
         return [
             (transition, self.chart.transitions[transition.key])
@@ -77,8 +86,8 @@ class ChartContext:
     def history_nodes(self) -> frozenset[int]:
         """The indices of the nodes whose active child is stored when they are left.
 
-        They have a history node or a transition with `history`; deep history adds the regions
-        inside.
+        They have a history node or are targets of a transition with `history`; deep history adds
+        the compound regions inside.
         """
         nodes = self.chart.nodes
         found = {node.parent for node in nodes if node.kind == "history"}
@@ -96,7 +105,8 @@ class ChartContext:
     def timer_keeping_nodes(self) -> frozenset[int]:
         """The indices of the nodes that a transition with `memory: continue` may enter.
 
-        Their wait counters are kept when they are left.
+        They are the nodes inside its domain that contain a target or lie inside one. Their wait
+        counters are kept when they are left.
         """
         found: set[int] = set()
         for transition, chart_transition in self.all_transitions:
@@ -112,30 +122,33 @@ class ChartContext:
 
 
 def to_identifier(text: str) -> str:
-    """Return a path with underscores instead of dots, as part of a variable's name."""
+    """Return a path with `_` for each dot, as part of a variable's name."""
     return text.replace(".", "_")
 
 
 def request_variable(region: str) -> str:
-    """Return the variable of the transition that a region requests, 0 for none."""
-    return f"work.wish_{to_identifier(region)}"
+    """Return `work.request_<region>`, the number of the transition that a region requests, or 0."""
+    return f"work.request_{to_identifier(region)}"
 
 
 def selected_variable(region: str) -> str:
-    """Return the variable of the transition that a region takes, 0 for none."""
-    return f"work.takes_{to_identifier(region)}"
+    """Return `work.selected_<region>`, the number of the transition that a region takes, or 0."""
+    return f"work.selected_{to_identifier(region)}"
 
 
 def history_ref(node: ChartNode) -> Ref:
-    """Return the variable of the mode that was active in a node when it was left."""
+    """Return `memory.left_<node>`, the mode that was active in a node when it was last left.
+
+    Its value is `NEVER_LEFT` before that. For a node that is not compound it is 1 after that.
+    """
     return Ref(f"memory.left_{to_identifier(node.path)}")
 
 
 def exit_flag(node: ChartNode) -> Ref:
-    """Return the variable that a node is left in this micro-step."""
+    """Return `work.exit_<node>`, whether a node is left in this micro-step."""
     return Ref(f"work.exit_{to_identifier(node.path)}")
 
 
 def entry_flag(node: ChartNode) -> Ref:
-    """Return the variable that a node is entered in this micro-step."""
+    """Return `work.enter_<node>`, whether a node is entered in this micro-step."""
     return Ref(f"work.enter_{to_identifier(node.path)}")

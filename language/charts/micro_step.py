@@ -65,8 +65,9 @@ LOOP_INDEX = "work.turn"
 
 
 def chart_blocks(context: ChartContext, evaluate_equations: Op) -> dict[str, Block]:
-    """Return the block `jump` and the blocks that it runs.
+    """Return the block `jump` and the blocks that it runs, by name.
 
+    They are those of selection and of exits, `commit`, and `micro_step` if a tick may have several.
     `evaluate_equations` is the operation that evaluates the equations of the active modes.
     """
     blocks = {**selection_blocks(context), **exit_blocks(context)}
@@ -81,7 +82,11 @@ def chart_blocks(context: ChartContext, evaluate_equations: Op) -> dict[str, Blo
 
 
 def chart_variables(context: ChartContext) -> list[Variable]:
-    """Return the variables of a chart; `finalise_program` removes the unused ones."""
+    """Return the variables of a chart; `finalise_program` removes the unused ones.
+
+    They are those of selection and of the event queue, a history and the exit and entry flags of
+    each node but the root, and those of the micro-steps and their log.
+    """
     found = [*selection_variables(context), *event_queue_variables(context.queue_capacity)]
     for node in context.chart.nodes[ROOT + 1 :]:
         about = f"mode in which `{node.path}` was left"
@@ -100,7 +105,7 @@ def chart_variables(context: ChartContext) -> list[Variable]:
 
 
 def clear_histories(context: ChartContext) -> Block:
-    """Return the assignments that mark all history nodes as never left."""
+    """Return the assignments that set the history of each of `history_nodes` to `NEVER_LEFT`."""
     nodes = (context.chart.nodes[index] for index in sorted(context.history_nodes))
     return tuple(Assign(history_ref(node).name, integer(NEVER_LEFT)) for node in nodes)
 
@@ -108,6 +113,7 @@ def clear_histories(context: ChartContext) -> Block:
 def lower_initial_entries(automaton: Automaton, chart: Chart, now: Mapping[str, Expr]) -> Block:
     """Return the entry actions of the initial configuration, one stage for each depth.
 
+    Outer nodes come first. Each stage evaluates the equations of the initial mode that it reads.
     `now` are the bindings without equations.
     """
     active = [
@@ -195,7 +201,7 @@ def _lower_micro_step(context: ChartContext) -> Block:
 
 def _resolve_conflicts(context: ChartContext) -> Block:
     """Return the operation that resolves conflicts between regions; none for a single region."""
-    return (RunBlock("hear"),) if len(context.chart.regions) > 1 else ()
+    return (RunBlock("resolve_conflicts"),) if len(context.chart.regions) > 1 else ()
 
 
 def _selected_variable_name(context: ChartContext) -> Callable[[str], str]:

@@ -57,9 +57,11 @@ EMPTY_SPAN = (1, 0)
 
 
 def selection_blocks(context: ChartContext) -> dict[str, Block]:
-    """Return the blocks `count_<mode>`, `choose_<mode>`, `select_transitions` and `hear`.
+    """Return the blocks that count waits, select transitions and resolve conflicts, by name.
 
-    `hear` resolves the requests of the regions; a single region has none.
+    They are `count_<node>` (waits and edges) and `choose_<node>` (request by priority) of each node
+    with transitions, `select_transitions` and, with several regions, `resolve_conflicts` and
+    `resolve_request_<region>`. A node without waits and edges has no `count_<node>`.
     """
     blocks: dict[str, Block] = {}
     for node in context.chart.nodes:
@@ -80,7 +82,11 @@ def selection_blocks(context: ChartContext) -> dict[str, Block]:
 
 
 def selection_variables(context: ChartContext) -> list[Variable]:
-    """Return the variables of requests, selections and spans of nodes."""
+    """Return the variables of the selection blocks, with or without conflicts.
+
+    Each region has its request, its selection, the first and last node that its request leaves, and
+    whether its request is resolved; the last three variables are common to all regions.
+    """
     found = []
     for region in context.chart.regions:
         name = region.region
@@ -97,7 +103,7 @@ def selection_variables(context: ChartContext) -> list[Variable]:
         ]
     return [
         *found,
-        Variable("work.keeps", "truth", about="no selected transition leaves the same node"),
+        Variable("work.is_granted", "truth", about="no selected transition leaves the same node"),
         Variable(IS_FIRST_STEP.name, "truth", about="this is the first micro-step of the tick"),
         Variable(IS_STEP_LIMIT_REACHED.name, "truth", about="no further micro-step is allowed"),
     ]
@@ -217,7 +223,10 @@ def _request_in_leaf(context: ChartContext, leaf: ChartNode, blocks: dict[str, B
 
 
 def _conflict_resolution_blocks(context: ChartContext) -> dict[str, Block]:
-    """Return the block `hear`, which turns requests into selections, and `hear_<region>`."""
+    """Return the block `resolve_conflicts` and, for each region, `resolve_request_<region>`.
+
+    They turn requests into selections.
+    """
     regions = context.chart.regions
     pairs = {region.index: _conflicting_regions(context, region) for region in regions}
     conflicts = any(pairs.values())
@@ -228,12 +237,12 @@ def _conflict_resolution_blocks(context: ChartContext) -> dict[str, Block]:
         ops.append(Assign(_is_resolved_variable(region), Value(False)))
         if conflicts:
             ops += _set_exit_span(context, region)
-        blocks[f"hear_{to_identifier(region.region)}"] = _resolve_request(
+        blocks[f"resolve_request_{to_identifier(region.region)}"] = _resolve_request(
             context, region, pairs[region.index]
         )
     for region in regions:
         ops += _resolve_in_leaf(context, region)
-    blocks["hear"] = tuple(ops)
+    blocks["resolve_conflicts"] = tuple(ops)
     return blocks
 
 
@@ -280,21 +289,21 @@ def _resolve_request(
     A conflict with a region around this one removes that region's selection; any other conflict
     rejects the request.
     """
-    keeps = Ref("work.keeps")
+    is_granted = Ref("work.is_granted")
     take: list[Op] = [
         Assign(selected_variable(region.region), Ref(request_variable(region.region)))
     ]
     ops: list[Op] = [Assign(_is_resolved_variable(region), Value(True))]
     if conflicting:
-        ops.append(Assign(keeps.name, Value(True)))
+        ops.append(Assign(is_granted.name, Value(True)))
     for other in conflicting:
         is_taken = Compare("!=", Ref(selected_variable(other.region)), integer(0))
         clash = Binary("and", is_taken, _spans_overlap(region, other))
         if context.chart.is_region_inside(region, other):
             take.insert(0, Branch(clash, (Assign(selected_variable(other.region), integer(0)),)))
         else:
-            ops.append(Branch(clash, (Assign(keeps.name, Value(False)),)))
-    return (*ops, Branch(keeps, tuple(take))) if conflicting else (*ops, *take)
+            ops.append(Branch(clash, (Assign(is_granted.name, Value(False)),)))
+    return (*ops, Branch(is_granted, tuple(take))) if conflicting else (*ops, *take)
 
 
 def _spans_overlap(left: ChartNode, right: ChartNode) -> Expr:
@@ -331,7 +340,9 @@ def _resolve_in_leaf(context: ChartContext, region: ChartNode) -> Block:
         if not context.transitions_in(each.region):
             continue
         fresh = Branch(
-            Ref(_is_resolved_variable(each)), (), (RunBlock(f"hear_{to_identifier(each.region)}"),)
+            Ref(_is_resolved_variable(each)),
+            (),
+            (RunBlock(f"resolve_request_{to_identifier(each.region)}"),),
         )
         ops = (
             Branch(Compare("!=", Ref(request_variable(each.region)), integer(0)), (fresh,), ops),
@@ -344,14 +355,14 @@ def _resolve_in_leaf(context: ChartContext, region: ChartNode) -> Block:
 
 def _span_first(region: ChartNode) -> str:
     """Return the variable of the first node that the request of a region leaves."""
-    return f"work.low_{to_identifier(region.region)}"
+    return f"work.span_first_{to_identifier(region.region)}"
 
 
 def _span_last(region: ChartNode) -> str:
     """Return the variable of the last node that the request of a region leaves."""
-    return f"work.high_{to_identifier(region.region)}"
+    return f"work.span_last_{to_identifier(region.region)}"
 
 
 def _is_resolved_variable(region: ChartNode) -> str:
     """Return the variable that the request of a region is resolved."""
-    return f"work.heard_{to_identifier(region.region)}"
+    return f"work.is_resolved_{to_identifier(region.region)}"

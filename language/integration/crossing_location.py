@@ -76,7 +76,10 @@ class IntegrationMethod:
 
 
 def hold_constant_states(field: VectorField, mode: str) -> list[Op]:
-    """Return the assignments work.end_x = state.x of the states whose rate is 0 in a mode."""
+    """Return the assignments `work.end_x = state.x` of the states whose rate is 0 in a mode.
+
+    `mode` is the name of the mode; the order is that of the file.
+    """
     still = constant_states(field.automaton.modes[mode])
     return [Assign(f"work.end_{n}", Ref(f"state.{n}")) for n in field.states if n in still]
 
@@ -84,7 +87,8 @@ def hold_constant_states(field: VectorField, mode: str) -> list[Op]:
 def clear_constant_series(field: VectorField, mode: str, terms: int) -> list[Op]:
     """Return the assignments of a zero polynomial to the states whose rate is 0 in a mode.
 
-    States whose rate is 0 in all modes have no polynomial and are left out.
+    Each of the `terms` coefficients is set to 0. States whose rate is 0 in all modes have no
+    polynomial and are left out.
     """
     still = constant_states(field.automaton.modes[mode])
     names = [name for name in ever_varying_states(field.automaton) if name in still]
@@ -94,8 +98,8 @@ def clear_constant_series(field: VectorField, mode: str, terms: int) -> list[Op]
 def merge_time(number: NumberType, step: Fraction, time: Fraction = Fraction(0)) -> float:
     """Return the time [s] within which events are one instant (rule 10).
 
-    In float64 it is MERGE_ULPS units in the last place of the larger of step and time: 0.9 ps at 1
-    s. In float32 it is that of the step, 0.5 us in 1 ms, since times are relative to the step.
+    In float64 it is MERGE_ULPS units in the last place of the larger of step and time [s]: 0.9 ps
+    at 1 s. In float32 it is that of the step, 0.5 us in 1 ms, since times are relative to the step.
     """
     whole = max(time, step) if number == "float64" else step
     return float(whole) * MERGE_ULPS * 2.0 ** (1 - SIGNIFICAND_BITS[number])
@@ -110,8 +114,10 @@ def continuous_step_blocks(
     armed: Callable[[Mode], ArmedGuards | None],
     is_wait: Expr | None = None,
 ) -> dict[str, Block]:
-    """Return the block `point` and `look_<mode>`, `locate_<mode>`, `move_<mode>` of each mode.
+    """Return `point` and the blocks `dense_guards_`, `locate_` and `flow_` of each mode.
 
+    `flow_<mode>` makes a step up to the first crossing, `locate_<mode>` finds it in `bisections`
+    halvings, `dense_guards_<mode>` evaluates the guards on the polynomial, `point` the states.
     `flows` are the blocks of the field. Crossings within `merge` [s] are one instant. `armed` gives
     the variables of the earlier truth of a mode's guards, or None if any true guard is a crossing.
     `is_wait` is the condition that a wait ends with the step: then a crossing shortly after the end
@@ -120,15 +126,19 @@ def continuous_step_blocks(
     paths = DenseOutput(method.terms, method.constant_states)
     blocks = {"point": paths.evaluate(field.states)}
     for mode in field.automaton.modes.values():
-        blocks[f"look_{mode.name}"] = event_search_block(field, mode, paths, flows)
+        blocks[f"dense_guards_{mode.name}"] = event_search_block(field, mode, paths, flows)
         crossed = any_guard_condition(field, mode, armed(mode))
         blocks[f"locate_{mode.name}"] = _bisect_crossing(field, mode, crossed, bisections, merge)
-        blocks[f"move_{mode.name}"] = _lower_continuous_step(field, mode, crossed, merge, is_wait)
+        blocks[f"flow_{mode.name}"] = _lower_continuous_step(field, mode, crossed, merge, is_wait)
     return blocks
 
 
 def continuous_step_variables(field: VectorField, method: IntegrationMethod) -> list[Variable]:
-    """Return the `work` variables of a continuous step and of the method."""
+    """Return the `work` variables of a continuous step and of the method.
+
+    States without a polynomial have only `work.end_<state>`; the others also `work.sum_<state>` and
+    the array `work.series_<state>`. The variables of the method come last.
+    """
     found = [
         Variable("work.h", "real", "s", about="step to flow over"),
         Variable("work.elapsed", "real", "s", about="part of the step until a crossing"),
@@ -204,7 +214,7 @@ def _accept_upper_end(field: VectorField, mode: Mode, is_before_end: Expr) -> Bl
 
 def _evaluate_guards_at(mode: Mode, time: Expr, comment: str = "") -> Block:
     """Return the operations that evaluate the guards of a mode at `time` [s] of the step."""
-    return (Assign("work.s", time, comment), RunBlock(f"look_{mode.name}"))
+    return (Assign("work.s", time, comment), RunBlock(f"dense_guards_{mode.name}"))
 
 
 def _accept_point(field: VectorField) -> Block:
@@ -241,7 +251,7 @@ def _merge_close_events(field: VectorField, mode: Mode, merge: Expr) -> Block:
 def _lower_continuous_step(
     field: VectorField, mode: Mode, crossed: Expr, merge: Expr, is_wait: Expr | None
 ) -> Block:
-    """Return the block `move_<mode>`: one step, cut at the first crossing.
+    """Return the block `flow_<mode>`: one step, cut at the first crossing.
 
     A mode without guards makes the whole step.
     """

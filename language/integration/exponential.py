@@ -69,12 +69,17 @@ class ExponentialContext:
     number_type: NumberType
 
     def state_matrix(self, field: VectorField, mode: str) -> Matrix:
-        """Return A (n, n) of a mode [unit_i/(unit_j s)], the Jacobian of its rates."""
+        """Return A (n, n) of a mode [unit_i/(unit_j s)], the Jacobian of its rates.
+
+        It has the nominal constants. Terms that are not linear with constant coefficients are left
+        out.
+        """
         return jacobian(self.rates[mode], field.states, self.point.constant_values)
 
     def scaled_step_matrices(self, field: VectorField, mode: str) -> list[Matrix]:
-        """Return A h of a mode in units of the ranges, for the nominal constants and each corner.
+        """Return A h of a mode in units of the ranges (`scale_by_ranges`).
 
+        The first matrix has the nominal constants, the others those of the corners in their order.
         An extreme value between two corners is not considered.
         """
         rates, states, h = self.rates[mode], field.states, float(self.step)
@@ -84,7 +89,11 @@ class ExponentialContext:
         ]
 
     def states_with_remainder(self, field: VectorField, mode: str) -> frozenset[str]:
-        """Return the states whose rate is not its row of A times x, for some calibration."""
+        """Return the states whose rate has a part that is not linear in the states.
+
+        Such a part is a constant, an input or a nonlinear term. Only fixed parameters have their
+        values; a term with a tunable or derived parameter counts as such a part.
+        """
         known = self.point.constant_values.items()
         fixed = {name: value for name, value in known if name.startswith("constant.")}
         parts = affine_forms(self.rates[mode], field.states, fixed)
@@ -94,7 +103,11 @@ class ExponentialContext:
 def exponential_method(
     field: VectorField, context: ExponentialContext, span: Span, problems: Problems
 ) -> IntegrationMethod:
-    """Return the exponential midpoint method for a field; a step that is too long is reported."""
+    """Return the exponential midpoint method for a field.
+
+    A mode with |A h| above `MAX_STEP_NORM` is reported as an error at `span` and has no step
+    blocks.
+    """
     return build_exponential_method(field, context, _step_blocks, span, problems)
 
 
@@ -107,7 +120,9 @@ def build_exponential_method(
 ) -> IntegrationMethod:
     """Return an exponential method; `step_blocks` returns the step blocks of one mode.
 
-    A mode with |A h| above MAX_STEP_NORM is reported. The matrices are solved constants.
+    The matrices of each mode are solved constants, without their zero entries. The number of Taylor
+    terms is the largest that any mode needs. A mode with |A h| above `MAX_STEP_NORM`, or NaN, at
+    any corner is reported as an error at `span` and has a block `series_<mode>` only.
     """
     blocks: dict[str, Block] = {}
     constants: list[Constant] = []
@@ -124,7 +139,7 @@ def build_exponential_method(
             continue
         constants += _solved_constants(field, name, context)
         blocks.update(step_blocks(field, name, context))
-        blocks[f"pull_{name}"] = _remainder_block(field, name, context)
+        blocks[f"remainder_{name}"] = _remainder_block(field, name, context)
         blocks[f"whole_{name}"] = _propagate(field, name, ("end", "E", "F"), context)
     bounded = [
         step for name, norm in norms.items() if norm <= MAX_STEP_NORM for step in steps[name]
@@ -133,7 +148,7 @@ def build_exponential_method(
     for name in field.automaton.modes:
         blocks[f"series_{name}"] = _taylor_series(field, name, context, terms)
     variables = [
-        Variable(f"work.pull_{name}", "real", str(rate_dimension(state.unit.dimension)))
+        Variable(f"work.remainder_{name}", "real", str(rate_dimension(state.unit.dimension)))
         for name, state in field.automaton.states.items()
     ]
     number = Variable("work.order", "real", about="order of a term")
@@ -186,34 +201,42 @@ def _row_products(
 
 def _remainder_refs(field: VectorField, mode: str, context: ExponentialContext) -> dict[str, Expr]:
     """Return the variables of the remainders of a mode, by state, if they are not always 0."""
-    pulled = context.states_with_remainder(field, mode)
-    return {name: Ref(f"work.pull_{name}") for name in field.states if name in pulled}
+    with_remainder = context.states_with_remainder(field, mode)
+    return {name: Ref(f"work.remainder_{name}") for name in field.states if name in with_remainder}
 
 
 def _remainder_block(field: VectorField, mode: str, context: ExponentialContext) -> Block:
-    """Return the block that evaluates the remainder: pull = rate - A x at the point."""
-    a, pulled = context.state_matrix(field, mode), context.states_with_remainder(field, mode)
+    """Return the block that evaluates the remainder: rate - A x at the point."""
+    a, with_remainder = (
+        context.state_matrix(field, mode),
+        context.states_with_remainder(field, mode),
+    )
     at: dict[str, Expr] = {name: Ref(f"work.at_{name}") for name in field.states}
     ops: list[Op] = [RunBlock(f"rates_{mode}")]
     for i, name in enumerate(field.states):
-        if name not in pulled:
+        if name not in with_remainder:
             continue
         linear = _row_products(field, mode, "A", a, i, at)
         rate = Ref(f"work.rate_{name}")
         value: Expr = subtract(rate, sum_of(linear)) if linear else rate
-        ops.append(Assign(f"work.pull_{name}", value))
+        ops.append(Assign(f"work.remainder_{name}", value))
     return tuple(ops)
 
 
 def lower_step_start(field: VectorField, mode: str) -> Block:
-    """Return the operations that evaluate the remainder at the start of the step."""
-    return (*set_point_to_state(field), *set_point_time(field, real(0.0)), RunBlock(f"pull_{mode}"))
+    """Return the operations that evaluate the remainder of a mode at the start of the step."""
+    return (
+        *set_point_to_state(field),
+        *set_point_time(field, real(0.0)),
+        RunBlock(f"remainder_{mode}"),
+    )
 
 
 def lower_step_end(field: VectorField, mode: str, context: ExponentialContext) -> Block:
     """Return the operations that set `work.end_<state>` from the states and the remainder.
 
-    A full step uses the solved matrices, a part of a step the Taylor sum.
+    A full step, `work.h` equal to the step of the context, uses the solved matrices
+    (`whole_<mode>`), a part of a step the Taylor sum.
     """
     end = Assign("work.s", Ref("work.h"))
     arrive = [Assign(f"work.end_{name}", Ref(f"work.at_{name}")) for name in field.states]
@@ -229,15 +252,15 @@ def _is_full_step(context: ExponentialContext) -> Expr:
 def _propagate(
     field: VectorField, mode: str, letters: tuple[str, str, str], context: ExponentialContext
 ) -> Block:
-    """Return the assignments work.<target>_x = E x + F pull; `letters` are target, E and F."""
+    """Return the assignments work.<target>_x = E x + F remainder; `letters` are target, E and F."""
     target, e, f = letters
     table = _solved_matrices(field, mode, context)
     state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in field.states}
-    pull = _remainder_refs(field, mode, context)
+    remainder = _remainder_refs(field, mode, context)
     ops = []
     for i, name in enumerate(field.states):
         parts = _row_products(field, mode, e, table[e], i, state)
-        parts += _row_products(field, mode, f, table[f], i, pull)
+        parts += _row_products(field, mode, f, table[f], i, remainder)
         ops.append(Assign(f"work.{target}_{name}", sum_of(parts)))
     return tuple(ops)
 
@@ -251,7 +274,7 @@ def _step_blocks(field: VectorField, mode: str, context: ExponentialContext) -> 
         *lower_step_start(field, mode),
         Branch(_is_full_step(context), (RunBlock(f"half_{mode}"),), part),
         *set_point_time(field, half),
-        RunBlock(f"pull_{mode}"),
+        RunBlock(f"remainder_{mode}"),
         *lower_step_end(field, mode, context),
     )
     moved = _propagate(field, mode, ("at", "Eh", "Fh"), context)
@@ -261,14 +284,17 @@ def _step_blocks(field: VectorField, mode: str, context: ExponentialContext) -> 
 def _taylor_series(
     field: VectorField, mode: str, context: ExponentialContext, term_count: int
 ) -> Block:
-    """Return the operations that fill the series: d_0 = A x0 + pull, d_i = A d_(i-1) / (i + 1)."""
-    a, pull = context.state_matrix(field, mode), _remainder_refs(field, mode, context)
+    """Return the operations that fill the series.
+
+    d_0 = A x0 + remainder, d_i = A d_(i-1) / (i + 1)
+    """
+    a, remainder = context.state_matrix(field, mode), _remainder_refs(field, mode, context)
     state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in field.states}
     order, index = Ref("work.order"), Ref("work.term")
     ops: list[Op] = [Assign("work.order", real(1.0))]
     for i, name in enumerate(field.states):
-        pulled = [pull[name]] if name in pull else []
-        value = sum_of([*_row_products(field, mode, "A", a, i, state), *pulled])
+        with_remainder = [remainder[name]] if name in remainder else []
+        value = sum_of([*_row_products(field, mode, "A", a, i, state), *with_remainder])
         ops.append(Store(f"work.series_{name}", integer(0), value))
     before: dict[str, Expr] = {name: Item(f"work.series_{name}", index) for name in field.states}
     body: list[Op] = [Assign("work.order", add(order, real(1.0)))]
@@ -281,7 +307,11 @@ def _taylor_series(
 def exact_method(
     field: VectorField, context: ExponentialContext, span: Span, problems: Problems
 ) -> IntegrationMethod:
-    """Return the exact method for a field; a mode whose flow is not affine is reported."""
+    """Return the exact method for a field: one remainder, at the start, for the whole step.
+
+    A mode whose flow is not affine with constant coefficients is reported with the terms that are
+    not, and so is a mode with |A h| above `MAX_STEP_NORM`.
+    """
     for mode in field.automaton.modes.values():
         others = non_affine_terms(field.automaton, mode, context.point)
         if others:

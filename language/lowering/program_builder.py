@@ -46,7 +46,8 @@ INACTIVE = "inactive"
 def input_variables(automaton: Automaton, group: str) -> list[Variable]:
     """Return a variable `<group>.<name>` for each input, in the order of the file.
 
-    Only the group `input` has a comment: the key path and the description of the input.
+    Only the group `input` has a comment: the key path and the description of the input, separated
+    by `; `.
     """
     return [
         Variable(
@@ -61,7 +62,7 @@ def input_variables(automaton: Automaton, group: str) -> list[Variable]:
 
 
 def state_variables(automaton: Automaton) -> list[Variable]:
-    """Return `state.<name>` for each state, then `equation.<name>` for each equation.
+    """Return `state.<name>` for each state, then `equation.<name>` for each equation of any mode.
 
     A state of a continuous automaton carries its range, in SI units.
     """
@@ -116,7 +117,9 @@ def _equation_type(automaton: Automaton, name: str) -> tuple[ValueType, str, tup
 def output_wires(automaton: Automaton) -> tuple[OutputWire, ...]:
     """Return the outputs in the order of the file, each with the variable that it reads.
 
-    The output `mode` adds one output for each region that is not an output itself.
+    `faults` reads the fault word. The output `mode` reads the mode of the chart and adds one output
+    for each other region, `_` for dots in its name, unless an output has that name. Others are
+    regions, states, discrete variables and equations.
     """
     found = []
     for output in automaton.outputs:
@@ -146,7 +149,7 @@ def output_wires(automaton: Automaton) -> tuple[OutputWire, ...]:
 
 
 def region_variables(automaton: Automaton, activation_unit: str) -> list[Variable]:
-    """Return the mode variable and the fired-transition variable of each region.
+    """Return `memory.mode` and the fired-transition variable of each region, in pairs.
 
     `activation_unit`, such as `tick`, is the word that the comments use for one execution.
     """
@@ -166,7 +169,7 @@ def clear_fired(automaton: Automaton) -> list[Op]:
 
 
 def any_fired_condition(automaton: Automaton) -> Expr:
-    """Return the condition that a transition has fired in at least one region."""
+    """Return the condition that the fired-transition variable of some region is not 0."""
     found: Expr | None = None
     for region in automaton.all_regions:
         here = Compare("!=", Ref(fired_variable(region.name)), integer(0))
@@ -176,7 +179,7 @@ def any_fired_condition(automaton: Automaton) -> Expr:
 
 
 def enter_initial_modes(automaton: Automaton, base: str) -> list[Assign]:
-    """Return the assignments that make the initial mode of each region active.
+    """Return the assignments of the initial mode's number to the mode variable of each region.
 
     `base` is the mode variable of the chart. In a chart with nested modes, a region that is not
     part of the initial configuration gets its number for inactive.
@@ -207,8 +210,8 @@ def _enter_initial_nodes(automaton: Automaton, chart: Chart, base: str) -> list[
 def lower_initial_values(automaton: Automaton, known: Mapping[str, Expr], prefix: str) -> list[Op]:
     """Return the assignments of the start values of all states and discrete variables.
 
-    Each variable comes after those that its start value reads. `prefix` opens the key paths. A
-    start value is held in the range of its variable (rule 18).
+    Each variable comes after those that its start value reads. `prefix` opens the key paths. In a
+    sampled automaton a start value is held in the range of its variable (rule 18).
     """
     ops: list[Op] = []
     variables = automaton.state_variables
@@ -220,7 +223,10 @@ def lower_initial_values(automaton: Automaton, known: Mapping[str, Expr], prefix
 
 
 def input_defaults(automaton: Automaton) -> dict[str, float | bool]:
-    """Return the declared default of each input that has one, by name, in the type of the input."""
+    """Return the declared default of each input that has one, by name, in the type of the input.
+
+    A real is rounded to the number type; an enumeration gives its number.
+    """
     found: dict[str, float | bool] = {}
     for name, thing in automaton.inputs.items():
         if thing.default is not None:
@@ -237,7 +243,8 @@ def assemble_program(
 ) -> Program:
     """Return a Program of blocks, with outputs, modes, regions and invariants of the automaton.
 
-    Variables with equal names are merged; the last one wins. Faults and functions are still empty.
+    Variables with equal names are merged: the last one wins, at the place of the first. Faults and
+    functions are still empty. The major step is the period, else the step.
     """
     return Program(
         name=automaton.name,
@@ -259,7 +266,10 @@ def assemble_program(
 
 
 def mode_infos(region: Region) -> tuple[ModeInfo, ...]:
-    """Return the modes of a region with their numbers, then the inactive mode if there is one."""
+    """Return the modes of a region with their numbers, in the order of the file.
+
+    The mode `inactive` comes last if the region has a number for it.
+    """
     found = [ModeInfo(mode.name, mode.number) for mode in region.modes.values()]
     if region.inactive is not None:
         found.append(ModeInfo(INACTIVE, region.inactive))
@@ -271,9 +281,10 @@ def finalise_program(
 ) -> Program:
     """Return the Program with only the blocks that are reachable from its entry blocks.
 
-    Constants and variables that no block, output or `keep` names are removed, except inputs and the
-    `is_new` flags. The elementary functions that are called are added. Literals are rounded to the
-    number type.
+    Entries that do not exist are ignored. Constants and variables that no block, output or `keep`
+    names are removed, except inputs and the `is_new` flags; tunables that solved constants depend
+    on stay. The elementary functions that are called are added. Literals are rounded to the number
+    type. `retain_inputs` keeps only inputs that another block reads.
     """
     blocks = _reachable_blocks(program.blocks, entries)
     used = {name for block in blocks.values() for name in block_names(block)}
@@ -303,17 +314,17 @@ def finalise_program(
 def _remove_unused_before(
     program: Program, variables: list[Variable], blocks: dict[str, Block]
 ) -> list[Variable]:
-    """Return the variables without each `before.<input>` that no block but `remember` reads.
+    """Return the variables without each `before.<input>` that no block but `retain_inputs` reads.
 
-    The block `remember` in `blocks` is replaced by one without the assignments to them.
+    The block `retain_inputs` in `blocks` is replaced by one without the assignments to them.
     """
-    if "remember" not in blocks:
+    if "retain_inputs" not in blocks:
         return variables
-    reading = {n for name, b in blocks.items() if name != "remember" for n in block_names(b)}
+    reading = {n for name, b in blocks.items() if name != "retain_inputs" for n in block_names(b)}
     assignments = tuple(
-        op for op in blocks["remember"] if isinstance(op, Assign) and op.target in reading
+        op for op in blocks["retain_inputs"] if isinstance(op, Assign) and op.target in reading
     )
-    blocks["remember"] = assignments
+    blocks["retain_inputs"] = assignments
     targets = {op.target for op in assignments}
     return [v for v in variables if not v.name.startswith("before.") or v.name in targets]
 

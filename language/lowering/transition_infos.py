@@ -27,7 +27,9 @@ from language.text.diagnostic import Problems
 def transition_infos(automaton: Automaton, problems: Problems) -> tuple[TransitionInfo, ...]:
     """Return the data of all transitions, numbered from 1 in the order of the file.
 
-    A wait that is negative, too long or not constant is reported.
+    A timer `timer.<mode>_<transition>` is given if the wait has at least one tick or is tunable; in
+    a continuous automaton, if it is above 0. A wait that is negative, longer than MAX_WAIT_TICKS or
+    not constant is reported.
     """
     found: list[TransitionInfo] = []
     back = {id(rollback.transition): rollback.max_ticks for rollback in rollbacks_of(automaton)}
@@ -89,7 +91,10 @@ def _chart_endpoints(automaton: Automaton, transition: Transition) -> tuple[str,
 def infos_of_mode(
     automaton: Automaton, mode: Mode, infos: tuple[TransitionInfo, ...]
 ) -> tuple[TransitionInfo, ...]:
-    """Return the data of the transitions that leave a mode, in the order of the file."""
+    """Return those of `infos` whose transitions leave a mode, in the order of the file.
+
+    `infos` are the data of all transitions of the automaton.
+    """
     first = _first_index_by_mode(automaton)[mode.key]
     return infos[first : first + len(mode.transitions)]
 
@@ -105,12 +110,13 @@ def _first_index_by_mode(automaton: Automaton) -> Mapping[str, int]:
 def start_run(automaton: Automaton, target: Mode) -> list[Op]:
     """Return the operations on entry of a mode that start its run and its observer's covariance.
 
-    The list is empty for a mode without a run and without a covariance that is set on entry.
+    They run `entry_covariance_<mode>` for a recursive observer with `covariance: steady`, and set
+    `memory.run_mode` to the mode of the run. The list is empty for a mode with neither.
     """
     ops: list[Op] = []
     observer = target.observer
     if observer and observer.gain == "recursive" and observer.covariance == "steady":
-        ops.append(RunBlock(f"cover_{target.name}"))
+        ops.append(RunBlock(f"entry_covariance_{target.name}"))
     if target.run is None or automaton.model is None:
         return ops
     number = automaton.model.modes[target.run.mode].number

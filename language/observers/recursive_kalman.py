@@ -65,7 +65,7 @@ from language.text.diagnostic import Problems
 
 
 def is_time_varying(automaton: Automaton, formula: Formula) -> bool:
-    """Return whether a spectral density reads more than parameters, or a previous value."""
+    """Return whether a spectral density reads a name that is no parameter, or calls `previous`."""
     memory = any(isinstance(part, FunctionCall) and part.function == "previous"
                  for part in walk(formula.tree))  # fmt: skip
     reads = {read.path for read in names_of(formula.tree)}
@@ -73,7 +73,10 @@ def is_time_varying(automaton: Automaton, formula: Formula) -> bool:
 
 
 def density_at_rest(formula: Formula, automaton: Automaton, values: Mapping[str, Scalar]) -> float:
-    """Return the value of a spectral density while all inputs and states are 0."""
+    """Return the value of a spectral density while all inputs, states and `previous` values are 0.
+
+    `values` are those of the constants by name in the Program.
+    """
     known: dict[str, Expr] = {n: real(0.0) for n in (*automaton.inputs, *automaton.states)}
     known.update(constant_bindings(automaton))
     for part in walk(formula.tree):
@@ -93,7 +96,9 @@ def lower_recursive_observer(
     """Return the observer of a mode; None if its matrices cannot be computed, which is reported.
 
     `before` are the bindings during the prediction, `now` those during the correction, `values` the
-    values of the constants.
+    values of the constants. The states are predicted by the matrices, or by the run of the mode if
+    the observer says so. Also reported are states that differ from those of the first recursive
+    observer, a missing steady covariance and wrong limits.
     """
     assert mode.observer and automaton.period is not None
     with problems.collect_errors():
@@ -155,7 +160,7 @@ class _RecursiveObserverBuilder:
             mean, extra = self._predict_mean(observer, own)
             spreads = self._covariance_blocks(observer, own)
             late, more = self._correct_input_change(observer, self.mode.name)
-            predict = (RunBlock(f"spread_{self.mode.name}"), *mean, *late)
+            predict = (RunBlock(f"propagate_{self.mode.name}"), *mean, *late)
             constants += extra + more
         info = ObserverInfo(
             self.mode.name, self.states, observer.inputs, measured, own.a, (), c,
@@ -289,12 +294,12 @@ class _RecursiveObserverBuilder:
                 depends_on = tunables_of(self.automaton, solved_formulas(observer))
                 constants += solved.nonzero_constants(ahead.matrices, depends_on)
                 spreads |= self._covariance_blocks(observer, ahead)
-                cases.append((mode.number, (RunBlock(f"spread_{tag}"),)))
+                cases.append((mode.number, (RunBlock(f"propagate_{tag}"),)))
                 late, more = self._correct_input_change(observer, tag)
                 constants += more
                 if late:
-                    spreads[f"late_{tag}"] = late
-                    after.append((mode.number, (RunBlock(f"late_{tag}"),)))
+                    spreads[f"input_change_{tag}"] = late
+                    after.append((mode.number, (RunBlock(f"input_change_{tag}"),)))
         chosen = self._choose_by_run_mode(run, cases)
         predict = (
             *chosen,
@@ -331,7 +336,7 @@ class _RecursiveObserverBuilder:
             )
         solved, tag = SolvedNames(prediction.name_prefix, observer), prediction.name_prefix
         return {
-            f"spread_{tag}": (*ops, RunBlock(f"rows_{tag}"), RunBlock(f"columns_{tag}")),
+            f"propagate_{tag}": (*ops, RunBlock(f"rows_{tag}"), RunBlock(f"columns_{tag}")),
             f"rows_{tag}": covariance_rows_block(solved, prediction),
             f"columns_{tag}": covariance_columns_block(solved, prediction),
         }

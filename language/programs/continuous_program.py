@@ -92,11 +92,11 @@ ENGINE_BLOCKS = (
     "latch",
     "start",
     "equations",
-    "watch",
+    "evaluate_guards",
     "jump",
     "limit",
     "flow",
-    "elapse",
+    "advance_time",
     "dense",
     "peek",
     "record",
@@ -111,9 +111,11 @@ A Program with varying inputs has no `step`.
 def lower_continuous_automaton(
     automaton: Automaton, problems: Problems, varying_inputs: Collection[str] = ()
 ) -> Program:
-    """Return the Program of a checked continuous automaton; SpecError if a problem is reported.
+    """Return the Program of a checked continuous automaton.
 
-    `varying_inputs` names the inputs that change inside a step.
+    `varying_inputs` names the inputs that change inside a step; with any of them the Program has no
+    block `step`. Fault bits are `zeno` and `livelock`. Raises SpecError if `problems` has an error,
+    also an earlier one.
     """
     parameters = parameter_constants(automaton, problems)
     transitions = transition_infos(automaton, problems)
@@ -153,7 +155,7 @@ def lower_continuous_automaton(
 def stable_step_limits(automaton: Automaton) -> tuple[StabilityLimit, ...]:
     """Return the largest stable step of each mode that has a limit.
 
-    A step above a limit is not reported.
+    Modes without a decaying component, and exponential methods, have none. Nothing is reported.
     """
     problems = Problems()
     histories = continuous_delays_of(automaton)

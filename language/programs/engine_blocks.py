@@ -45,8 +45,9 @@ def engine_blocks(
 ) -> dict[str, Block]:
     """Return the blocks that are run from outside, by name.
 
-    They are `derive`, `init`, `start`, `equations`, `watch`, `jump`, `flow`, `dense`, `peek` and,
-    with delays, `record`. `known` are the bindings without equations.
+    They are `derive`, `init`, `start`, `equations`, `evaluate_guards`, `jump`, `flow`, `dense`,
+    `peek` and, with delays, `record`. `known` are the bindings without equations. Other blocks,
+    such as `jump_<mode>`, are run by name and not included.
     """
     automaton = field.automaton
     now = (*set_point_to_state(field), *set_point_time(field, real(0.0)))
@@ -64,7 +65,9 @@ def engine_blocks(
         Assign(RECORD_AGE.name, real(0.0)),
     )
     record = {"record": keep} if delays else {}
-    watch = tuple((mode.number, _watch_block(automaton, mode)) for mode in automaton.modes.values())
+    guards_by_mode = tuple(
+        (mode.number, _guard_block(automaton, mode)) for mode in automaton.modes.values()
+    )
     return {
         "derive": derive_block(automaton),
         "init": (
@@ -75,14 +78,14 @@ def engine_blocks(
         "start": (*_start_block(field, known, waits, delays), *fill),
         "equations": evaluate,
         **record,
-        "watch": (
+        "evaluate_guards": (
             *_clear_periodic_alarms(automaton),
             *now,
-            Switch("memory.mode", watch),
-            RunBlock("load"),
+            Switch("memory.mode", guards_by_mode),
+            RunBlock("restart_waits"),
         ),
         "jump": (*clear_fired(automaton), *now, run_block_by_mode(field, "jump")),
-        "flow": (run_block_by_mode(field, "move"),),
+        "flow": (run_block_by_mode(field, "flow"),),
         "dense": (
             Switch(
                 field.mode_variable_name, tuple((m.number, _dense_output_block(m)) for m in modes)
@@ -126,7 +129,7 @@ def _dense_output_block(mode: Mode) -> Block:
     return (Branch(Unary("not", is_known), run),) if guard_slots(mode) else run
 
 
-def _watch_block(automaton: Automaton, mode: Mode) -> Block:
+def _guard_block(automaton: Automaton, mode: Mode) -> Block:
     """Return the operations that evaluate and store the guards and levels of a mode."""
     armed = [
         Assign(f"memory.armed_{slot}", Ref(f"work.guard_{slot}")) for slot in guard_slots(mode)

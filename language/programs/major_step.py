@@ -76,7 +76,7 @@ class WaitTimer:
 
     @property
     def restart(self) -> Assign:
-        """The assignment that sets the timer to its duration."""
+        """The assignment that sets the timer to its duration [s]."""
         return Assign(self.timer, real(self.duration))
 
 
@@ -84,7 +84,10 @@ WaitTimers = tuple[WaitTimer, ...]
 
 
 def wait_timers_of(infos: tuple[TransitionInfo, ...], alarms: tuple[Alarm, ...]) -> WaitTimers:
-    """Return the timers of transitions with a wait, then those of `after` and `every`."""
+    """Return the timers of transitions with a wait, then those of `after` and `every`.
+
+    The k-th alarm has `timer.after_<k>`, from 1, also for `every`.
+    """
     found = []
     for info in infos:
         if info.timer:
@@ -108,7 +111,10 @@ BlocksByMode = Mapping[tuple[str, int], Block]
 
 
 def begin_blocks(waits: WaitTimers) -> BlocksByMode:
-    """Return the operations on entry of each mode that start its timers."""
+    """Return the operations on entry of each mode that start its timers, by region and mode.
+
+    Modes without timers are left out.
+    """
     found: dict[tuple[str, int], list[Op]] = {}
     for wait in waits:
         found.setdefault((wait.region, wait.mode), []).extend((*wait.on_begin, wait.restart))
@@ -116,7 +122,10 @@ def begin_blocks(waits: WaitTimers) -> BlocksByMode:
 
 
 def end_blocks(waits: WaitTimers) -> BlocksByMode:
-    """Return the operations on exit of each mode that restart its waits (rule 4)."""
+    """Return the operations on exit of each mode that restart its waits (rule 4).
+
+    Keys are region and number of the mode; `after` and `every` are left out.
+    """
     found: dict[tuple[str, int], list[Op]] = {}
     for wait in waits:
         if wait.is_restarted:
@@ -132,25 +141,28 @@ def block_of_mode(blocks: BlocksByMode, mode: Mode) -> Block:
 def major_step_blocks(
     field: VectorField, waits: WaitTimers, age_variables: tuple[str, ...]
 ) -> dict[str, Block]:
-    """Return the blocks `latch`, `limit`, `elapse`, `load`, `settle` and `segment`.
+    """Return the blocks of a major step, by name.
 
-    `load` restarts the waits whose guard is false. `segment` is limit, step, elapse and, if an
-    event happened inside the step, settle. `age_variables` [s] are the times since a record at a
-    major step.
+    They are `latch` (present inputs to `before.<name>`), `limit`, `advance_time`, `restart_waits`
+    (waits whose guard is false), `macro_step` and `segment`: limit, flow, time and, if an event
+    happened before the end of the step, a macro-step. `age_variables` [s] are the times since a
+    record at a major step; `advance_time` increases them.
     """
     inputs = field.automaton.inputs
     return {
         "latch": tuple(Assign(f"before.{name}", Ref(f"input.{name}")) for name in inputs),
         "limit": _limit_block(field, waits),
-        "elapse": _elapse_block(field, waits, age_variables),
-        "load": _for_each_wait(field, tuple(w for w in waits if w.is_restarted), _restart_if_idle),
-        "settle": _settle_block(field),
+        "advance_time": _advance_time_block(field, waits, age_variables),
+        "restart_waits": _for_each_wait(
+            field, tuple(w for w in waits if w.is_restarted), _restart_if_idle
+        ),
+        "macro_step": _macro_step_block(field),
         "segment": _segment_block(field),
     }
 
 
 def major_step_variables(field: VectorField, waits: WaitTimers) -> list[Variable]:
-    """Return the variables of the blocks of a major step."""
+    """Return the timers of the waits and the other variables of the blocks of a major step."""
     return [
         *(Variable(wait.timer, "real", "s", about="rest of the wait") for wait in waits),
         Variable("memory.started", "truth", about="the first step is done"),
@@ -159,14 +171,17 @@ def major_step_variables(field: VectorField, waits: WaitTimers) -> list[Variable
         Variable("work.left", "real", "s", about="rest of the major step"),
         Variable("work.is_wait", "truth", about="a wait ends with the segment"),
         Variable("work.event", "truth", about="a guard changed or a wait ended"),
-        Variable("work.is_settling", "truth"),
+        Variable("work.in_macro_step", "truth"),
         Variable("work.micro_step", "whole"),
         Variable("work.piece", "whole"),
     ]
 
 
 def is_wait_over(info: TransitionInfo) -> Expr:
-    """Return the condition that the wait of a transition with a timer is over."""
+    """Return the condition that the wait of a transition is over: its timer is at most 0.
+
+    The transition has to have a timer.
+    """
     assert info.timer
     return Compare("<=", Ref(info.timer), real(0.0))
 
@@ -207,7 +222,9 @@ def _merge_window(field: VectorField) -> Expr:
     return multiply(per_second, Call("max", (end, real(step))))
 
 
-def _elapse_block(field: VectorField, waits: WaitTimers, age_variables: tuple[str, ...]) -> Block:
+def _advance_time_block(
+    field: VectorField, waits: WaitTimers, age_variables: tuple[str, ...]
+) -> Block:
     """Return the block that advances time by `work.elapsed`.
 
     Events within `work.merge` [s] of the end of the segment are at the same instant (rule 10).
@@ -240,7 +257,7 @@ def _restart_if_idle(wait: WaitTimer) -> Block:
     return (Branch(wait.is_running, (), (wait.restart,)),)
 
 
-def _settle_block(field: VectorField) -> Block:
+def _macro_step_block(field: VectorField) -> Block:
     """Return the block that runs micro-steps until none fires.
 
     As many micro-steps as the regions have modes may fire; one more sets the fault bit `livelock`
@@ -248,14 +265,14 @@ def _settle_block(field: VectorField) -> Block:
     """
     regions = field.automaton.all_regions
     bound = sum(len(region.modes) for region in regions)
-    going = Ref("work.is_settling")
+    going = Ref("work.in_macro_step")
     fired = any_fired_condition(field.automaton)
     micro_step: Block = (Branch(going, (RunBlock("jump"), Assign(going.name, fired))),)
     return (
         Assign(going.name, Value(True)),
         Loop(bound + 1, "work.micro_step", micro_step),
         Branch(going, (FaultBit(LIVELOCK), *clear_fired(field.automaton))),
-        RunBlock("watch"),
+        RunBlock("evaluate_guards"),
     )
 
 
@@ -264,17 +281,19 @@ def _segment_block(field: VectorField) -> Block:
     inside = Binary("and", Ref("work.event"), Compare(">", Ref("work.left"), real(0.0)))
     return (
         RunBlock("limit"),
-        run_block_by_mode(field, "move"),
-        RunBlock("elapse"),
-        Branch(inside, (RunBlock("settle"),)),
+        run_block_by_mode(field, "flow"),
+        RunBlock("advance_time"),
+        Branch(inside, (RunBlock("macro_step"),)),
     )
 
 
 def major_step_block(field: VectorField, has_record: bool, blocks: Mapping[str, Block]) -> Block:
     """Return the block `step`; `blocks` are the blocks that it runs.
 
-    The first call latches the inputs and starts the automaton; later calls integrate first.
-    `has_record` tells whether delayed quantities are recorded.
+    The first call latches the inputs and starts the automaton. Later calls record (if
+    `has_record`), integrate in at most MAX_EVENTS_PER_STEP + 1 segments (else the fault bit `zeno`
+    is set) and then latch. A macro-step follows at the start, after an event at the end and if an
+    input that it reads has changed. The equations come last.
     """
     left, event = Ref("work.left"), Ref("work.event")
     is_left = Compare(">", left, real(0.0))
@@ -293,18 +312,18 @@ def major_step_block(field: VectorField, has_record: bool, blocks: Mapping[str, 
     enter: Block = (RunBlock("latch"), RunBlock("start"), Assign(event.name, Value(True)))
     return (
         Branch(Ref("memory.started"), flow, enter),
-        Branch(event, (RunBlock("settle"),)),
+        Branch(event, (RunBlock("macro_step"),)),
         RunBlock("equations"),
     )
 
 
 def _detect_input_change(field: VectorField, event: Ref, blocks: Mapping[str, Block]) -> Block:
-    """Return the operation that requests `settle` if an input has changed that it reads.
+    """Return the operation that requests `macro_step` if an input has changed that it reads.
 
-    It is empty if `settle` reads no input.
+    It is empty if `macro_step` reads no input.
     """
     due: Expr = event
-    read = names_used(blocks[name] for name in reachable_blocks("settle", blocks))
+    read = names_used(blocks[name] for name in reachable_blocks("macro_step", blocks))
     for name, thing in field.automaton.inputs.items():
         if f"before.{name}" not in read:
             continue

@@ -69,7 +69,7 @@ EVENT_LIMIT = "event_limit"
 """The fault bit of a run with more events than allowed."""
 RUN_MODE = "memory.run_mode"
 """The variable of the mode of the run."""
-SATURATION_BLOCK = "hold"
+SATURATION_BLOCK = "saturate_states"
 """The block that holds the states of a run in their ranges."""
 STEP_DIVIDING_METHODS = ("midpoint", "rk4")
 """Methods whose polynomial divides by the step.
@@ -99,8 +99,9 @@ def build_run_step(
 ) -> RunStep:
     """Return the integration of the model inside a tick; `values` are those of the constants.
 
-    Reported are runs with different settings, a model with memory, with actions, with discrete
-    variables or with waits, and inputs without a value.
+    Method, substeps and linearisation are those of the first run. Reported are runs with different
+    settings, a model with actions, with discrete variables or with waits, inputs without a value,
+    and what the method reports. Raises SpecError if the model uses a function with memory.
     """
     model = automaton.model
     assert model and automaton.period is not None
@@ -174,9 +175,9 @@ def _require_equal_settings(runs: list[ModelRun], problems: Problems) -> None:
 def run_block(automaton: Automaton, run: ModelRun, duration: Expr | None = None) -> Block:
     """Return the advance of a mode that runs the model over a period, through its events.
 
-    `duration`, a part of the period [s], replaces the period; the run should then have one substep.
-    States are held in their ranges at the end or, for methods that divide by the step, after each
-    segment.
+    Without `follow` the flow of one mode is integrated and no guard is tested. `duration`, a part
+    of the period [s], replaces the substep; the run should then have one substep. States are held
+    in their ranges at the end or, with `follow` and STEP_DIVIDING_METHODS, after each segment.
     """
     model = automaton.model
     assert model and automaton.period is not None
@@ -199,7 +200,8 @@ def saturate_moved_states(
 ) -> tuple[Block, Block]:
     """Return the operations before and after code that integrates states of the model.
 
-    They hold the states in their ranges. Methods that divide by the step use the shared block.
+    They hold the states `names` in their ranges. STEP_DIVIDING_METHODS use the shared block
+    `saturate_states`, which holds all states that the model writes.
     """
     assert automaton.model
     is_shared = method in STEP_DIVIDING_METHODS
@@ -223,7 +225,7 @@ def _substep_with_events(
     after: Block = (Branch(may_jump, (*look, run_block_by_mode(field, "switch")), at_limit),)
     segment: Block = (
         Assign("work.h", Ref("work.left")),
-        run_block_by_mode(field, "move"),
+        run_block_by_mode(field, "flow"),
         *held,
         Assign("work.left", subtract(Ref("work.left"), Ref("work.elapsed"))),
         Branch(Ref("work.crossed"), after),
@@ -331,6 +333,7 @@ def _mode_variables(model: Automaton) -> list[Variable]:
 def start_run_regions(model: Automaton) -> list[Op]:
     """Return the assignments that set the parallel regions of a run's model to their initial modes.
 
-    A run enters a mode of the model's chart; its parallel regions continue from tick to tick.
+    The chart is left out: a run enters a mode of it, and the parallel regions continue from tick to
+    tick.
     """
     return [op for op in enter_initial_modes(model, RUN_MODE) if op.target != RUN_MODE]

@@ -1,11 +1,11 @@
 """Transitions with `rewind`: the transition is made at the past crossing of its `until` condition.
 
-The block `back_<mode>_<index>` searches backwards for the latest tick at which `until` is false.
-The crossing lies in the tick after it, on the flow of the source from the recorded states and
-inputs, and is located by bisection. The micro-step is made there. The run of the target then
-carries the states over the rest of that tick and over each later tick. If `until` was true in all
-recorded ticks, or is false at present, nothing is rolled back and, unless the spec says otherwise,
-a fault bit is set.
+The block `rollback_<mode>_<index>` searches backwards for the latest tick with `until` false. The
+crossing lies in the tick after it, on the flow of the source from the recorded states and inputs,
+and is located by bisection. The micro-step is made there. The run of the target then carries the
+states over the rest of that tick and over each later tick. If `until` was true in all recorded
+ticks, or is false at present, nothing is rolled back and, unless the spec says otherwise, a fault
+bit is set.
 """
 
 from __future__ import annotations
@@ -57,9 +57,9 @@ from language.programs.model_run import run_block, saturate_moved_states
 
 REWIND_LIMIT = "rewind_limit"
 """The fault bit of a rewind without a crossing."""
-TICKS_BACK = Ref("work.back", is_integer=True)
+TICKS_BACK = Ref("work.ticks_back", is_integer=True)
 """The number of ticks since `until` was false; 0 if no such tick was found."""
-LOOKBACK_INDEX = Ref("work.look", is_integer=True)
+LOOKBACK_INDEX = Ref("work.lookback_index", is_integer=True)
 """The index of the loops over recorded ticks."""
 IS_UNTIL_TRUE = Ref("work.until")
 """The variable of the truth of `until`."""
@@ -68,14 +68,15 @@ REMAINING_TIME = Ref("work.rest")
 
 
 def rollback_blocks(automaton: Automaton, mode: Mode, now: NameBindings) -> dict[str, Block]:
-    """Return the blocks `until_<...>` and `back_<...>` of a mode's transitions with `rewind`.
+    """Return the blocks `until_<...>` and `rollback_<...>` of a mode's transitions with `rewind`.
 
-    `now` are the bindings without equations.
+    The suffix is `<mode>_<index>`, with the index of the transition. `now` are the bindings without
+    equations. The dict is empty without such transitions.
     """
     blocks: dict[str, Block] = {}
     for rollback in rollbacks_from(automaton, mode):
         blocks[f"until_{rollback.block_suffix}"] = _until_block(rollback, now)
-        blocks[f"back_{rollback.block_suffix}"] = _rollback_block(rollback, now)
+        blocks[f"rollback_{rollback.block_suffix}"] = _rollback_block(rollback, now)
     return blocks
 
 
@@ -97,7 +98,10 @@ def advance_blocks(automaton: Automaton, mode: Mode) -> dict[str, Block]:
 
 
 def rollback_bindings(automaton: Automaton, now: NameBindings) -> dict[str, Expr]:
-    """Return the bindings at the crossing: recorded inputs replace the present ones."""
+    """Return a copy of the bindings in which recorded inputs are those at the crossing.
+
+    They are `work.past_<name>`; all other names are as in `now`.
+    """
     return {
         **now,
         **{name: recorded_input_ref(automaton, name) for name in recorded_inputs(automaton)},
@@ -105,7 +109,10 @@ def rollback_bindings(automaton: Automaton, now: NameBindings) -> dict[str, Expr
 
 
 def rollback_equation_bindings(rollback: Rollback) -> dict[str, Expr]:
-    """Return the variables of the equations at the crossing that exit and reset read."""
+    """Return the variables `work.past_<name>` of the equations that exit and reset read, by name.
+
+    Equations that these read in turn are included; the values are those at the crossing.
+    """
     known = equation_formulas(rollback.source)
     names = equation_closure(rollback.source, rollback.names_read_by_jump)
     return {name: Ref(f"work.past_{name}", known[name][0].is_integer) for name in names}
@@ -114,7 +121,8 @@ def rollback_equation_bindings(rollback: Rollback) -> dict[str, Expr]:
 def advance_from_crossing(rollback: Rollback) -> Block:
     """Return the operations that run the target from the crossing to the present.
 
-    If nothing was rolled back they do nothing.
+    First comes the rest of the tick of the crossing (not for a source without a flow), then each
+    later tick with its recorded inputs. If nothing was rolled back they do nothing.
     """
     automaton = rollback.automaton
     target = automaton.target_mode(rollback.transition)
@@ -136,7 +144,10 @@ def advance_from_crossing(rollback: Rollback) -> Block:
 
 
 def rollback_variables(automaton: Automaton) -> list[Variable]:
-    """Return the variables of rollbacks; `finalise_program` removes the unused ones."""
+    """Return the variables of rollbacks; `finalise_program` removes the unused ones.
+
+    They are those of the tick history, of the search and of equations at the crossing.
+    """
     return [
         *tick_history_variables(automaton),
         Variable(TICKS_BACK.name, "whole"),
@@ -183,7 +194,8 @@ def _rollback_block(rollback: Rollback, now: NameBindings) -> Block:
 def _search_crossing_tick(rollback: Rollback) -> Block:
     """Return the search from the present backwards for the latest tick with `until` false.
 
-    `work.back` becomes the number of ticks back, 0 if none is found or `until` is false at present.
+    `work.ticks_back` becomes the number of ticks back: 0 if none is found, or if `until` is
+    false at present.
     """
     automaton, until = rollback.automaton, RunBlock(f"until_{rollback.block_suffix}")
     is_wanted = Binary(

@@ -2,8 +2,8 @@
 
 Blocks: `init` (before the first tick), `step` (one tick) and the blocks that these run: `latch`,
 `start`, `predict_<mode>`, `correct_<mode>` and `run_<mode>` (the advance), `equations_<mode>`,
-`decide` (truth tables), `jump_<mode>`, `keep` (delayed values and history), `update_<mode>` and
-`remember`. A run adds the blocks of the vector field of its model.
+`evaluate_tables` (truth tables), `jump_<mode>`, `record_history` (delayed values, ticks),
+`update_<mode>` and `retain_inputs`. A run adds the blocks of the vector field of its model.
 """
 
 from __future__ import annotations
@@ -70,7 +70,10 @@ SET_STARTED = Assign("memory.started", Value(True))
 
 
 def lower_sampled_automaton(automaton: Automaton, problems: Problems) -> Program:
-    """Return the Program of a checked sampled automaton; SpecError if a problem is reported."""
+    """Return the Program of a checked sampled automaton.
+
+    Raises SpecError if `problems` has an error, also an earlier one.
+    """
     builder = _SampledLowering(automaton, problems)
     program = builder.build()
     problems.raise_if_errors()
@@ -172,13 +175,13 @@ class _SampledLowering:
         found: dict[str, Block] = {COMPARE_STAMPS: compare_stamps_block(stamps)} if stamps else {}
         return found | {
             "latch": latch_inputs(self.automaton),
-            "remember": tuple(
+            "retain_inputs": tuple(
                 Assign(f"before.{n}", ref)
                 for n, ref in variable_bindings(self.automaton, "input").items()
                 if n in inputs
             ),
-            "decide": truth_table_block(self.automaton, self.bindings),
-            "keep": self._keep_block(),
+            "evaluate_tables": truth_table_block(self.automaton, self.bindings),
+            "record_history": self._history_block(),
             "start": self._start_block(),
             "derive": derive_block(self.automaton),
             "init": self._init_block(bool(stamps)),
@@ -219,7 +222,7 @@ class _SampledLowering:
             found[f"predict_{mode.name}"] = observer.predict
             found[f"correct_{mode.name}"] = observer.correct
             if observer.entry_covariance:
-                found[f"cover_{mode.name}"] = observer.entry_covariance
+                found[f"entry_covariance_{mode.name}"] = observer.entry_covariance
             if mode.observer.variance_limits and COVARIANCE_RANGE not in self.faults:
                 self.faults.append(COVARIANCE_RANGE)
         return found
@@ -290,8 +293,8 @@ class _SampledLowering:
             mode.name: self._advance_of_mode(mode) for mode in self.automaton.modes.values()
         }
         resets = {name: reset_innovations(self.observers, name) for name in self.automaton.modes}
-        keeps = bool(self._keep_block())
-        return tick_block(self.automaton, advances, resets, keeps, self._has_start_block())
+        has_history = bool(self._history_block())
+        return tick_block(self.automaton, advances, resets, has_history, self._has_start_block())
 
     def _has_start_block(self) -> bool:
         """Return whether the first tick differs from `init` or later ticks have an advance."""
@@ -300,7 +303,7 @@ class _SampledLowering:
             map(self._advance_of_mode, self.automaton.modes.values())
         )
 
-    def _keep_block(self) -> Block:
+    def _history_block(self) -> Block:
         """Return the operations that record delays, timers and history after the jump."""
         delayed = record_delays_block(self.automaton, self.delays, self.bindings)
         return (*delayed, *count_ticks(self.automaton), *record_tick_history(self.automaton))

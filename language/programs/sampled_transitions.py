@@ -43,9 +43,10 @@ def lower_sampled_jump(
 ) -> Block:
     """Return the jump of a mode: edges, wait counters, then at most one transition (rules 3 and 4).
 
-    The first tick with a true guard counts 1, so a wait of N ticks is over when the counter exceeds
-    N. With parallel regions the jump selects only; `lower_sampled_commit` performs the actions
-    (rule 14).
+    Of the enabled transitions that with the smallest priority is taken. The first tick with a true
+    guard counts 1, so a wait of N ticks is over when the counter exceeds N. With parallel regions
+    the jump sets the fired-transition variable only; `lower_sampled_commit` performs the actions
+    (rule 14). `now` are the bindings without equations.
     """
     everywhere = {**now, **equation_bindings(automaton, "equation.")}
     edges = detect_edges(automaton, mode, everywhere)
@@ -87,7 +88,7 @@ def _lower_transition(
         rollback = Rollback(automaton, source, transition, transition.rewind)
         now = rollback_bindings(automaton, now)
         known = {**now, **rollback_equation_bindings(rollback)}
-        go_back = [RunBlock(f"back_{rollback.block_suffix}")]
+        go_back = [RunBlock(f"rollback_{rollback.block_suffix}")]
         advance = advance_from_crossing(rollback)
     return [
         *go_back,
@@ -108,8 +109,10 @@ def lower_sampled_commit(
 ) -> Block:
     """Return the actions of the transitions that the regions have selected (rule 6).
 
-    Each stage of all regions reads one snapshot. `evaluate_equations` evaluates the equations of
-    the new modes; it runs before the entries if one of them reads an equation.
+    They are exits, resets, changes of mode (with timers and runs) and entries; each stage of all
+    regions reads one snapshot. `evaluate_equations` evaluates the equations of the new modes; it
+    runs before the entries if an entry of any mode reads an equation. `now` are the bindings
+    without equations.
     """
     numbers = {info.key: info.number for info in infos}
 

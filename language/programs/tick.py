@@ -17,14 +17,16 @@ def tick_block(
     automaton: Automaton,
     advance_blocks: Mapping[str, Block],
     innovation_resets: Mapping[str, Block],
-    has_keep_block: bool,
+    has_history_block: bool,
     has_start_block: bool,
 ) -> Block:
     """Return the block `step`.
 
-    `advance_blocks` are the advances by mode of the chart; `innovation_resets` set the innovations
-    to 0 that an advance may leave unset. `has_keep_block` tells whether a block `keep` records
-    delays and history, `has_start_block` whether the first tick runs `start` instead of an advance.
+    The order is: clear fired transitions and fault bits that are not latched, `latch`, advance (or
+    `start` in the first tick), jump, `record_history`, updates, `retain_inputs`. `advance_blocks`
+    are the advances by mode of the chart; `innovation_resets` set the innovations to 0 that an
+    advance may leave unset. `has_history_block` tells whether there is a block `record_history`,
+    `has_start_block` whether the first tick runs `start`; without it there is no advance.
     """
     ops: list[Op] = clear_fired(automaton)
     ops += [
@@ -41,13 +43,17 @@ def tick_block(
             )
         )
     ops += _jump_block(automaton)
-    if has_keep_block:
-        ops.append(RunBlock("keep"))
-    return (*ops, *_update_block(automaton), RunBlock("remember"))
+    if has_history_block:
+        ops.append(RunBlock("record_history"))
+    return (*ops, *_update_block(automaton), RunBlock("retain_inputs"))
 
 
 def reset_innovations(observers: Mapping[str, LoweredObserver], mode: str) -> Block:
-    """Return the assignments of 0 to the innovations that the correction of a mode may not set."""
+    """Return the assignments of 0 to the innovations that the correction of a mode may not set.
+
+    The innovations are those of all observers. Left out are those that the mode's correction
+    assigns outside a branch.
+    """
     measures = dict.fromkeys(name for each in observers.values() for name in each.info.measures)
     correct = observers[mode].correct if mode in observers else ()
     always_set = {op.target for op in correct if isinstance(op, Assign)}
@@ -58,7 +64,7 @@ def reset_innovations(observers: Mapping[str, LoweredObserver], mode: str) -> Bl
 def run_region_block_by_mode(region: Region, block_prefix: str) -> Switch:
     """Return a Switch over the mode of a region that runs `<block_prefix>_<mode>`.
 
-    For `update` and `store`, modes without an update are left out.
+    For the prefixes `update` and `store`, modes without an update are left out.
     """
     modes = region.modes.values()
     targets = [mode for mode in modes if block_prefix not in ("update", "store") or mode.update]
@@ -89,7 +95,7 @@ def _jump_block(automaton: Automaton) -> Block:
     ops: list[Op] = [equations]
     if automaton.tables:
         ops += [
-            RunBlock("decide"),
+            RunBlock("evaluate_tables"),
             *((equations,) if has_table_dependent_equations(automaton) else ()),
         ]
     if automaton.fault_mode:

@@ -135,5 +135,5 @@ def _step(blocks: dict[str, Block]) -> Block:
         each("jump"),
         Branch(Compare("!=", Ref("memory.fired"), integer(0)), (each("equations"),)),
         each("update"),
-        RunBlock("remember"),
+        RunBlock("retain_inputs"),
     )

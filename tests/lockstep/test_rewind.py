@@ -170,7 +170,7 @@ def taped(program: Program, ticks: list[Tick]) -> tuple[TickLog, Counter[str]]:
         stepper.run("step")
         tape.record_tick(stepper)
         if stepper.get("memory.fired") in back:
-            count = stepper.get("work.back")
+            count = stepper.get("work.ticks_back")
             seen["limit" if not count else "one tick" if count == 1 else "more ticks"] += 1
             if count == 1:  # else the runs of later ticks have overwritten it
                 seen["inside a tick" if stepper.get("work.rest") > 0.0 else "on a tick"] += 1

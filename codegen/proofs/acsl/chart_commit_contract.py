@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import combinations, product
 from typing import TypeAlias
 
-from codegen.proofs.acsl.chart_conflict_contract import Hearing
+from codegen.proofs.acsl.chart_conflict_contract import ConflictResolution
 from codegen.proofs.acsl.chart_entry_terms import modes_after, outcomes
 from codegen.proofs.acsl.chart_predicates import Configuration, all_of, any_of
 from language.charts.chart_context import history_ref
@@ -46,7 +46,7 @@ class Commit:
         """Yield that the selected transitions leave active modes, each once."""
         words = self.words
         yield from words.valid(words.now)
-        yield from Hearing(words).consistent(words.now)
+        yield from ConflictResolution(words).consistent(words.now)
         for region in words.charting.chart.regions:
             taken = [f"{words.now(words.chosen(region.region))} == 0"]
             for transition, way in words.charting.transitions_in(region.region):

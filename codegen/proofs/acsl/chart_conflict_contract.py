@@ -1,4 +1,4 @@
-"""Chart conflict contract: which transition requests of regions are taken, for `hear` (rule 15).
+"""Chart conflict contract: which requests `resolve_conflicts` takes (rule 15).
 
 The requests of innermost modes are considered, in the `order` of the regions around them. Of two
 that leave the same mode, the one from further inside is taken, else the earlier one (W3C, SCXML,
@@ -18,8 +18,8 @@ from language.model.statechart import ChartNode
 
 
 @dataclass(frozen=True)
-class Hearing:
-    """The contract of `hear`.
+class ConflictResolution:
+    """The contract of `resolve_conflicts`.
 
     Requests and modes do not change, so all clauses refer to the final state.
     """
@@ -27,21 +27,21 @@ class Hearing:
     words: Configuration
 
     def ensured(self) -> Iterator[str]:
-        """Yield the postconditions of `hear`."""
+        """Yield the postconditions of `resolve_conflicts`."""
         for said in self.consistent(self.words.now):
             yield f"ensures {said};"
         for region in self.words.charting.chart.regions:
-            own, heard = (
+            own, considered = (
                 self.words.now(selected_variable(region.region)),
                 any_of(self._offers(region)),
             )
             if not self.words.charting.transitions_in(region.region):
                 yield f"ensures {own} == 0;"
                 continue
-            wished = self.words.now(request_variable(region.region))
-            yield f"ensures {own} == 0 || ({own} == {wished} && {heard});"
+            requested = self.words.now(request_variable(region.region))
+            yield f"ensures {own} == 0 || ({own} == {requested} && {considered});"
             beaten = any_of(self._beats(other, region) for other in self._rivals(region))
-            yield f"ensures ({heard} && {wished} != 0 && {own} == 0) ==> {beaten};"
+            yield f"ensures ({considered} && {requested} != 0 && {own} == 0) ==> {beaten};"
 
     def consistent(self, at: Look) -> Iterator[str]:
         """Yield that no two of the taken transitions leave the same mode."""
@@ -84,9 +84,9 @@ class Hearing:
                 found[way.domain].append(self.words.number(transition))
         return found
 
-    def _listeners(self) -> list[tuple[str, list[ChartNode]]]:
-        """Return, of each region in the order of hearing, when one of its modes listens, and the
-        regions whose wishes that hears, the first one that has a wish.
+    def _candidates(self) -> list[tuple[str, list[ChartNode]]]:
+        """Return, in the order of resolution, when an innermost mode of a region is active, and the
+        regions of which the first one with a request is then considered.
         """
         chart, words = self.words.charting.chart, self.words
         found = []
@@ -96,18 +96,18 @@ class Hearing:
             around = [r for r in around if words.charting.transitions_in(r.region)]
             if chart.order == "inner_first":
                 around.reverse()
-            listens = words.is_in(region.region, (n for n in plain if n is not None), words.now)
-            found.append((listens, around))
+            active = words.is_in(region.region, (n for n in plain if n is not None), words.now)
+            found.append((active, around))
         return found
 
     def _offered(self, region: ChartNode) -> Iterator[str]:
-        """Yield, of each listener, that it hears the wish of a region."""
-        for listens, around in self._listeners():
+        """Yield, of each of `_candidates`, that it considers the request of a region."""
+        for active, around in self._candidates():
             if region in around:
                 before = around[: around.index(region)]
                 none = [f"{self.words.now(request_variable(r.region))} == 0" for r in before]
                 own = f"{self.words.now(request_variable(region.region))} != 0"
-                yield all_of([listens, own, *none])
+                yield all_of([active, own, *none])
             else:
                 yield "\\false"
 
@@ -115,12 +115,12 @@ class Hearing:
         return (said for said in self._offered(region) if said != "\\false")
 
     def _beats(self, one: ChartNode, other: ChartNode) -> str:
-        """Return that the wish of a region is taken instead of that of another."""
+        """Return that the request of a region is taken instead of that of another."""
         chart = self.words.charting.chart
         clash = self._clash(one, other, request_variable, self.words.now)
-        heard = any_of(self._offers(one))
+        considered = any_of(self._offers(one))
         if chart.is_region_inside(one, other):
-            return all_of([heard, clash])
+            return all_of([considered, clash])
         if chart.is_region_inside(other, one):
             return "\\false"
         mine, theirs = list(self._offered(one)), list(self._offered(other))
@@ -129,4 +129,4 @@ class Hearing:
             for place, said in enumerate(mine)
             if said != "\\false"
         )
-        return all_of([heard, clash, earlier])
+        return all_of([considered, clash, earlier])

@@ -1,9 +1,9 @@
 """Chart contracts: contracts of the functions of a micro-step, inserted before each of them in C.
 
-The contracts of `select_transitions`, `hear` and `commit`, and of the functions that count and
-choose in a mode, follow from the chart. All other functions, and the parts into which these are
-split, have lemmas from the Program (`symbolic_summary.py`): the values that they leave, and that
-they write nothing else.
+The contracts of `select_transitions`, `resolve_conflicts`, `commit`, and of the functions that
+count and choose in a mode, follow from the chart. All other functions, and the parts into which
+these are split, have lemmas from the Program (`symbolic_summary.py`): the values that they leave,
+and that they write nothing else.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from codegen.proofs.acsl.assigns_contract import (
     required,
 )
 from codegen.proofs.acsl.chart_commit_contract import Commit
-from codegen.proofs.acsl.chart_conflict_contract import Hearing
+from codegen.proofs.acsl.chart_conflict_contract import ConflictResolution
 from codegen.proofs.acsl.chart_predicates import Configuration
 from codegen.proofs.acsl.chart_selection_contract import Choice
 from codegen.proofs.acsl.chart_step_contract import Jump, Step
@@ -57,7 +57,7 @@ from language.ir.program import Program
 from language.ir.traversal import block_writes, reachable_blocks, walk_ops
 from language.model.statechart import ChartNode
 
-SELECT, HEAR, COMMIT = "select_transitions", "hear", "commit"
+SELECT, RESOLVE, COMMIT = "select_transitions", "resolve_conflicts", "commit"
 STEP, JUMP = "micro_step", "jump"
 MODEL = ("-wp-model", "Typed+real")
 """Options of WP: reals have no rounding, which suffices because guards only compare them. Accesses
@@ -65,7 +65,13 @@ and overflows are checked by the value analysis (eva.py)."""
 OF_PARTS = (*MODEL, "-wp-split")
 OF_CHART = MODEL
 """Options for functions that run others one after the other."""
-ONE_BY_ONE = (SELECT, HEAR, COMMIT, JUMP, *(f"{name}_{k}" for name in (STEP, JUMP) for k in (1, 2)))
+ONE_BY_ONE = (
+    SELECT,
+    RESOLVE,
+    COMMIT,
+    JUMP,
+    *(f"{name}_{k}" for name in (STEP, JUMP) for k in (1, 2)),
+)
 OWN_TYPE = r"\b(u?)int(?:16|32)_t (?={}\[)"
 
 
@@ -172,7 +178,7 @@ class ChartContract:
         """The parts of that function: operations, what is asked before, and what they leave."""
         step, blocks = Step(self.words), self.made.blocks
         names = [part_name(self._stepping, number) for number in range(3)]
-        choosing = tuple(RunBlock(name) for name in (SELECT, HEAR) if name in blocks)
+        choosing = tuple(RunBlock(name) for name in (SELECT, RESOLVE) if name in blocks)
         valid = list(self.words.valid(self.words.now))
         found: dict[str, tuple[Block, Sequence[str], Sequence[str]]] = {
             names[0]: (choosing, valid, list(step.chosen())),
@@ -232,8 +238,8 @@ class ChartContract:
                 yield from Choice(words).of_region(region)
         elif part != block and part not in self._steps:
             return
-        elif block == HEAR:
-            yield from Hearing(words).ensured()
+        elif block == RESOLVE:
+            yield from ConflictResolution(words).ensured()
         elif block == COMMIT:
             yield from Commit(words).ensured()
         elif part in self._steps:

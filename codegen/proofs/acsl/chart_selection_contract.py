@@ -58,7 +58,7 @@ class Choice:
         for leaf in leaves:
             assert leaf.number is not None
             here = f"{words.now(mode)} == {words.place.integer_constant(mode, leaf.number)}"
-            yield f"ensures ({here} ==> {self._wished(region, leaf)});"
+            yield f"ensures ({here} ==> {self._requested(region, leaf)});"
         known = " || ".join(f"{words.now(mode)} == {leaf.number}" for leaf in leaves)
         yield f"ensures ({known}) || {words.now(name)} == 0;"
         sources = [f"{words.now(name)} == 0"]
@@ -72,8 +72,8 @@ class Choice:
                 active = words.is_active(node, words.now)
                 yield from self._counts(node, self._unless_left(region, active))
 
-    def _wished(self, region: ChartNode, leaf: ChartNode) -> str:
-        """Return what a region wishes for in an innermost mode, or that a fault decides it."""
+    def _requested(self, region: ChartNode, leaf: ChartNode) -> str:
+        """Return what a region requests in an innermost mode, or that a fault decides it."""
         charting, fault = self.words.charting, self._fault
         name = self.words.now(request_variable(region.region))
         chain = [n for n in charting.chart.region_ancestors(leaf) if charting.transitions_of(n)]
@@ -123,7 +123,7 @@ class Choice:
         return f"{self.words.now(info.timer)} > {ticks}"
 
     def _enabled(self, node: ChartNode, transition: Transition) -> str:
-        """Return that the event of a transition is heard and its guard is true."""
+        """Return that the event of a transition is present and its guard is true."""
         words, chart = self.words, self.words.charting.chart
         if transition.is_completion:
             return words.speech.predicate(is_complete(chart, node, "memory.mode"), words.now)

@@ -31,7 +31,7 @@ def queue_candidates(program: Program, cut: Cutpoint, first: Mapping[str, int]) 
     truths = truths_of(program, first)
     ends = [name for name in counters_of(program, cut) if name not in first]
     read = [(target, name) for target, name in _read(ops, stored) if target in cut.names]
-    yield from _heard(program, cut, going_values(program, first), read, stored)
+    yield from _current_events(program, cut, going_values(program, first), read, stored)
     for name, items in arrays.items():
         yield from (Within(cut, end, (0, len(items))) for end in ends)
         for end, head in permutations(ends, 2):
@@ -70,7 +70,7 @@ def _read(ops: Sequence[Op], stored: Numbers) -> list[tuple[str, str]]:
     return list(found)
 
 
-def _heard(
+def _current_events(
     program: Program,
     cut: Cutpoint,
     going: Sequence[Literal],

@@ -26,7 +26,7 @@ def test_a_purpose_names_the_mode_where_there_is_one() -> None:
     assert describe_function("equations") == "Equations"
     assert describe_function("latch_each").startswith("Inputs one by one")
     assert describe_function("what_nobody_knows") == ""
-    both = describe_function("leap_gap_no_contact", ("gap", "drive"), ("no_contact",))
+    both = describe_function("fast_path_gap_no_contact", ("gap", "drive"), ("no_contact",))
     assert both.startswith("The whole step in mode gap with the model in no_contact,")
 
 

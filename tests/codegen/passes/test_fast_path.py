@@ -1,4 +1,4 @@
-"""Leap: a step in which nothing happens is one block of C, and has the bits of the engine."""
+"""Fast path: a step without an event is one block of C, and has the bits of the engine."""
 
 from __future__ import annotations
 
@@ -65,20 +65,22 @@ def inputs(count: int = 400) -> list[dict[str, float | bool]]:
     ]
 
 
-LEAPS: tuple[FastPathMode, ...] = ("on", "anew")
+FAST_PATHS: tuple[FastPathMode, ...] = ("on", "anew")
 
 
-def leaps(made: Program) -> set[str]:
+def fast_paths(made: Program) -> set[str]:
     return {
-        name for name in add_fast_path(restrict_to_step(made)).blocks if name.startswith("leap_")
+        name
+        for name in add_fast_path(restrict_to_step(made)).blocks
+        if name.startswith("fast_path_")
     }
 
 
 @pytest.mark.parametrize("number", NUMBER_TYPES)
 @pytest.mark.parametrize("method", ["euler", "midpoint", "rk4"])
-def test_a_leap_has_the_bits_of_the_engine(number: NumberType, method: str) -> None:
+def test_a_fast_path_has_the_bits_of_the_engine(number: NumberType, method: str) -> None:
     made = cart(number, method)
-    assert leaps(made) == {"leap_free", "leap_held"}
+    assert fast_paths(made) == {"fast_path_free", "fast_path_held"}
     tape = record_ticks(made, inputs())
     assert compare(tape).is_equal
     assert len(set(column(tape, "memory.mode"))) == 2
@@ -100,7 +102,7 @@ def test_only_inputs_that_guards_read_are_looked_at(when: str, event: set[str]) 
 
 def test_a_mode_that_waits_takes_the_general_path() -> None:
     made = cart(wait=", wait: 35 ms")
-    assert leaps(made) == {"leap_held"}
+    assert fast_paths(made) == {"fast_path_held"}
     assert compare(record_ticks(made, inputs())).is_equal
 
 
@@ -113,7 +115,7 @@ def test_an_automaton_without_guards_has_no_general_path() -> None:
 
 
 @pytest.mark.parametrize(("count", "wanted"), [(1, 6), (2, 0)])
-def test_regions_leap_together_with_the_chart_unless_there_are_too_many(
+def test_regions_take_it_together_with_the_chart_unless_there_are_too_many(
     count: int, wanted: int
 ) -> None:
     """Of a predictor, each mode with each: two of the chart and three of each region."""
@@ -122,23 +124,23 @@ def test_regions_leap_together_with_the_chart_unless_there_are_too_many(
     beside = ", ".join(f"r{k}: {{initial: low, modes: {{{modes}}}}}" for k in range(count))
     made = program(text.replace("initial: free", f"regions: {{{beside}}}\ninitial: free"))
     blocks = add_fast_path(restrict_to_step(made), "anew").blocks
-    assert sum(name.startswith("leap_") for name in blocks) == wanted
-    assert not leaps(made)
+    assert sum(name.startswith("fast_path_") for name in blocks) == wanted
+    assert not fast_paths(made)
 
 
 def test_what_a_page_may_have_turned_is_computed_again() -> None:
     """`drag` reads a tunable parameter."""
-    block = add_fast_path(restrict_to_step(cart())).blocks["leap_free"]
+    block = add_fast_path(restrict_to_step(cart())).blocks["fast_path_free"]
     before = block[:-1]
     assert isinstance(block[-1], Branch)
     read = {name for name in names_used([before]) if name.startswith("equation.")}
     assert "equation.drag" not in read
     text = emit_c_files(cart())["cart.c"]
-    leap = text[text.index("void leap_free(") :].partition("\n}\n")[0]
-    assert "cal->d * self->state.v" in leap
+    function = text[text.index("void fast_path_free(") :].partition("\n}\n")[0]
+    assert "cal->d * self->state.v" in function
 
 
-def test_a_page_that_turns_between_two_leaps_counts_at_once() -> None:
+def test_a_page_that_turns_between_two_steps_counts_at_once() -> None:
     made = cart()
     tape = TickLog(made, made.name)
     stepper = Interpreter(made)
@@ -154,12 +156,12 @@ def test_a_page_that_turns_between_two_leaps_counts_at_once() -> None:
     assert verdict.is_equal, str(verdict.first)
 
 
-def test_a_tick_that_runs_a_model_leaps_in_float32_alone() -> None:
+def test_a_tick_that_runs_a_model_has_one_in_float32_alone() -> None:
     blocks = add_fast_path(restrict_to_step(shipped("estimator_float32"))).blocks
-    assert {name for name in blocks if name.startswith("leap_gap_")} == {
-        "leap_gap_drive_contact",
-        "leap_gap_no_contact",
-        "leap_gap_coast_contact",
+    assert {name for name in blocks if name.startswith("fast_path_gap_")} == {
+        "fast_path_gap_drive_contact",
+        "fast_path_gap_no_contact",
+        "fast_path_gap_coast_contact",
     }
     double = restrict_to_step(shipped("estimator"))
     assert add_fast_path(double) == double
@@ -168,7 +170,7 @@ def test_a_tick_that_runs_a_model_leaps_in_float32_alone() -> None:
 def test_a_name_is_not_given_twice() -> None:
     """Of modes `gap` and `gap_no_contact` that both run: what would be called the same stays."""
     made = restrict_to_step(shipped("estimator_float32"))
-    taken = dataclasses.replace(made, blocks={**made.blocks, "leap_gap_no_contact": ()})
+    taken = dataclasses.replace(made, blocks={**made.blocks, "fast_path_gap_no_contact": ()})
     assert add_fast_path(taken) == taken
 
 
@@ -197,7 +199,7 @@ def test_a_sampled_automaton_without_a_run_stays_as_it_is() -> None:
 
 def test_what_nobody_reads_is_not_computed() -> None:
     for name, block in add_fast_path(restrict_to_step(cart())).blocks.items():
-        if name.startswith("leap_"):
+        if name.startswith("fast_path_"):
             targets = [op.target for op in walk_ops(block) if hasattr(op, "target")]
             made = {target for target in targets if target.startswith("work.")}
             assert made <= names_used([block]) and len(made) > 10
@@ -210,9 +212,9 @@ def test_of_states_that_are_set_between_steps_no_equation_is_older_than_they_are
             name
             for title, block in add_fast_path(made, one).blocks.items()
             for name in block_reads(block)
-            if title.startswith("leap_") and name.startswith("equation.")
+            if title.startswith("fast_path_") and name.startswith("equation.")
         }
-        for one in LEAPS
+        for one in FAST_PATHS
     }
     read = {f"equation.{name}" for name in ("T_hs", "T_v", "w_d", "w_free")}
     assert older == {"on": read, "anew": set()}

@@ -18,13 +18,13 @@ from modewright.api.simulation import program
 def test_what_computes_much_has_a_frame_of_its_own() -> None:
     found = select_noinline_blocks(run_c_passes(program("estimator")))
     assert {"predict_drive", "half_no_contact", "series_coast_contact", "point"} <= found
-    assert "rates_drive_contact" not in found, "pull_drive_contact alone runs it, and is apart"
-    assert not found & {"run_gap", "latch", "remember"}
+    assert "rates_drive_contact" not in found, "remainder_drive_contact alone runs it, and is apart"
+    assert not found & {"run_gap", "latch", "retain_inputs"}
 
 
 def test_what_is_alike_in_all_modes_of_a_run_stands_once_and_apart() -> None:
     made = run_c_passes(program("hko"))
-    stages = {"stage_1", "stage_2", "stage_3", "stage_4", "cubic", "hold"}
+    stages = {"stage_1", "stage_2", "stage_3", "stage_4", "cubic", "saturate_states"}
     assert stages | {"rows_gap_no_contact", "columns_gap_no_contact"} <= select_noinline_blocks(
         made
     )
@@ -32,7 +32,7 @@ def test_what_is_alike_in_all_modes_of_a_run_stands_once_and_apart() -> None:
 
 
 def test_what_a_loop_runs_is_apart() -> None:
-    assert "look_drive_contact" in select_noinline_blocks(run_c_passes(program("hko")))
+    assert "dense_guards_drive_contact" in select_noinline_blocks(run_c_passes(program("hko")))
 
 
 def test_whole_numbers_are_not_computed_in_software() -> None:

@@ -38,7 +38,9 @@ def contract_of(text: str, name: str) -> str:
 def test_what_transitions_run_has_a_contract_and_a_spread_has_none() -> None:
     made, text = printed()
     called = called_by(made, JUMPS)
-    assert {"back_drive_0", "rest_gap", "run_gap", "step_no_contact", "hold"} <= set(called)
+    assert {"rollback_drive_0", "rest_gap", "run_gap", "step_no_contact", "saturate_states"} <= set(
+        called
+    )
     assert not {*JUMPS, "rows_gap_no_contact", "correct_gap"} & set(called)
     told = add_effect_contracts(made, text, called)
     assert len(re.findall(r"^/\*@", told, re.M)) == len(called)
@@ -49,7 +51,7 @@ def test_a_contract_names_what_is_written_and_nothing_else() -> None:
     told = add_effect_contracts(made, text, called_by(made, JUMPS))
     assert "assigns *work;" in contract_of(told, "guards_drive_contact")
     assert "assigns self->run_mode;" in contract_of(told, "switch_drive_contact")
-    back = contract_of(told, "back_drive_0")
+    back = contract_of(told, "rollback_drive_0")
     assert "requires work == &self->work;" in back
     assert "self->mode" not in back and "self->fired" not in back
     assert "self->state.w_w" in back and not re.search(r"\blow\b", back), "it lives inside"
@@ -69,7 +71,7 @@ def test_values_of_a_step_that_live_in_a_function_are_not_seen_by_its_caller(
 
 def test_an_array_is_written_from_end_to_end() -> None:
     made, _ = printed()
-    assert "self->past_w_w[0 .. 2]" in places_of(made, "keep")
+    assert "self->past_w_w[0 .. 2]" in places_of(made, "record_history")
 
 
 def test_turns_of_a_loop_may_write_what_the_function_may_and_what_lives_in_it() -> None:

@@ -28,8 +28,8 @@ pytestmark = pytest.mark.skipif(
     not all(map(shutil.which, DEBIAN_PACKAGES)), reason="a tool is missing: make system-packages"
 )
 NAME = "supervisor"
-FAULT = "work->wish_chart = supervisor_FIRED_operation_fault;"
-TRIPPED = "work->wish_chart = supervisor_FIRED_operation_tripped;"
+FAULT = "work->request_chart = supervisor_FIRED_operation_fault;"
+TRIPPED = "work->request_chart = supervisor_FIRED_operation_tripped;"
 MISTAKES = {
     "priorities are exchanged": ("choose_operation", FAULT, TRIPPED),
     "a guard lacks a condition": (
@@ -49,16 +49,17 @@ MISTAKES = {
     ),
     "an inner mode goes before the outer one": (
         "select_transitions_1",
-        "        choose_operation(self, work);\n        if (work->wish_chart == 0U) {\n"
+        "        choose_operation(self, work);\n        if (work->request_chart == 0U) {\n"
         "            choose_operation_standby(self, in, work);\n        }",
-        "        choose_operation_standby(self, in, work);\n        if (work->wish_chart == 0U) {\n"
+        "        choose_operation_standby(self, in, work);\n"
+        "        if (work->request_chart == 0U) {\n"
         "            choose_operation(self, work);\n        }",
     ),
     "of two wishes both are taken": (
-        "hear_operation_drive_torque",
-        "            work->takes_chart = 0U;\n        }\n"
-        "        work->takes_operation_drive_torque",
-        "            /* nothing to do */\n        }\n        work->takes_operation_drive_torque",
+        "resolve_request_operation_drive_torque",
+        "            work->selected_chart = 0U;\n        }\n"
+        "        work->selected_operation_drive_torque",
+        "            /* nothing to do */\n        }\n        work->selected_operation_drive_torque",
     ),
     "a history is not kept": (
         "leave_operation",
@@ -147,7 +148,9 @@ def test_a_chart_that_was_lowered_to_another_target_is_found(tmp_path: Path) -> 
     """C and Program agree on it, so it is the chart that says that it is wrong."""
     own = made()
     commit = own.made.blocks["commit"]
-    entered = [op for op in commit if isinstance(op, Switch) and op.selector == "work.takes_main"]
+    entered = [
+        op for op in commit if isinstance(op, Switch) and op.selector == "work.selected_main"
+    ]
     (first, to_shut), (second, to_open) = entered[-1].cases
     wrong = dataclasses.replace(entered[-1], cases=((first, to_open), (second, to_shut)))
     blocks = {

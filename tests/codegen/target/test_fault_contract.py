@@ -62,17 +62,17 @@ outputs: [mode, faults]
 """
 ASKED = """\
         if (work->fault_happened) {
-            work->wish_chart = guarded_FIRED_busy_b_fault_mode;
+            work->request_chart = guarded_FIRED_busy_b_fault_mode;
         } else {
             choose_busy(self, work);
-            if (work->wish_chart == 0U) {
+            if (work->request_chart == 0U) {
                 choose_busy_b(self, work);
             }
         }
 """
 LATER = """\
         choose_busy(self, work);
-        if (work->wish_chart == 0U) {
+        if (work->request_chart == 0U) {
             choose_busy_b(self, work);
         }
 """
@@ -174,7 +174,7 @@ LOWERED: dict[str, tuple[str, object, str]] = {
     ),
 }
 """What is exchanged, for what, and the function whose contract does not hold then."""
-WHOLE = ("select_transitions", "hear", "commit", "micro_step_1", "micro_step_2")
+WHOLE = ("select_transitions", "resolve_conflicts", "commit", "micro_step_1", "micro_step_2")
 
 
 @pytest.mark.parametrize("order", ["outer_first", "inner_first"])

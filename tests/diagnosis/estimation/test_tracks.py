@@ -191,7 +191,7 @@ def test_most_effects_go_side_by_side(effect: str, bench: ModelSet) -> None:
     """The library tells: it holds what follows several."""
     candidate = candidate_of(bench, effect)
     library = Path(candidate.predictor._library._name).read_bytes()
-    assert (b"follow_abreast" in library) == LAID[effect]
+    assert (b"follow_simd" in library) == LAID[effect]
 
 
 @pytest.mark.parametrize("substeps", [1, 3])
@@ -212,7 +212,7 @@ def test_both_sides_of_a_gap_take_a_step_at_once(bench: ModelSet) -> None:
     program = slice_to_outputs(program_of(bench.automaton))
     columns = columns_of(program, OUTPUTS)
     found = simd_recordings_context(program, columns.states, columns.outputs)
-    assert [sorted(leap.modes.values()) for leap in found["leaps"]] == [
+    assert [sorted(step.modes.values()) for step in found["fast_steps"]] == [
         ["coast_contact", "drive_contact"],
         ["no_contact"],
     ]

@@ -245,15 +245,13 @@ def test_no_block_of_ours_that_integrates_or_locates_is_kept(
         "dense",
         "peek",
         "point",
-        "move",
         "step",
         "series",
         "locate",
-        "look",
         "segment",
-        "settle",
+        "macro",
     }
-    assert set(kept) >= {"init", "start", "equations", "watch", "jump"}
+    assert set(kept) >= {"init", "start", "equations", "evaluate_guards", "jump"}
 
 
 @pytest.mark.long

@@ -118,7 +118,7 @@ outputs: [x]
 def test_the_memory_of_an_input_that_nobody_looks_back_at_is_left_out() -> None:
     made = program(TEXT)
     assert names_of(made, "before") == []
-    assert made.blocks["remember"] == ()
+    assert made.blocks["retain_inputs"] == ()
 
 
 def test_a_function_comes_with_those_that_it_calls() -> None:

@@ -161,7 +161,7 @@ def test_what_rests_is_held_where_a_transition_resets_it(tmp_path: Path, method:
 def test_at_a_crossing_only_what_moves_is_held_in_its_range(tmp_path: Path, method: str) -> None:
     """What rests is there what it was at a tick."""
     made = clock(tmp_path, BACK, method)
-    (back,) = [name for name in made.blocks if name.startswith("back_")]
+    (back,) = [name for name in made.blocks if name.startswith("rollback_")]
     assert "state.c" in written(made, back)
     told = repr(made.blocks[back] if method == "euler" else made.blocks[SATURATION_BLOCK])
     moves = [True, method != "euler", False]  # what is held by the block of all runs moves in one

@@ -137,8 +137,8 @@ def blocks_by(method: str, folder: Path) -> dict[str, Block]:
 def test_a_run_by_rk4_holds_states_after_each_segment(tmp_path: Path) -> None:
     blocks = blocks_by("rk4", tmp_path)
     (loop,) = (op for op in blocks["run_only"] if isinstance(op, Loop))
-    assert RunBlock("hold") in tuple(walk_ops(loop.body))
-    assert "hold" not in blocks_by("exponential", tmp_path)
+    assert RunBlock("saturate_states") in tuple(walk_ops(loop.body))
+    assert "saturate_states" not in blocks_by("exponential", tmp_path)
 
 
 @pytest.mark.parametrize(("method", "least"), [("rk4", 0.1 * 2.0**-60), ("exponential", 0.0)])

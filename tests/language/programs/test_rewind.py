@@ -88,7 +88,7 @@ def test_what_leaves_its_range_at_a_crossing_is_held_there(
     """z is 4 at the tick before the crossing, 6 at it: the bound, or what it was (rule 18)."""
     text = HELD.replace("METHOD", method).replace("ON_RANGE", on_range)
     made = program(text, project_of(tmp_path, pushed=PUSHED))
-    (back,) = [name for name in made.blocks if name.startswith("back_")]
+    (back,) = [name for name in made.blocks if name.startswith("rollback_")]
     assert (SATURATION_BLOCK in reachable_blocks(back, made.blocks)) == (
         method in ("midpoint", "rk4")
     )

@@ -128,9 +128,9 @@ def _late(program: Program) -> Program:
 def _early(program: Program) -> Program:
     """`previous` is the value of now: kept before the equations are evaluated."""
     step = program.blocks["step"]
-    keep = tuple(op for op in step if op == RunBlock("keep"))
+    keep = tuple(op for op in step if op == RunBlock("record_history"))
     place = next((k for k, op in enumerate(step) if "equations_" in repr(op)), 0)
-    rest = (*step[:place], *keep, *(op for op in step[place:] if op != RunBlock("keep")))
+    rest = (*step[:place], *keep, *(op for op in step[place:] if op != RunBlock("record_history")))
     return dataclasses.replace(program, blocks={**program.blocks, "step": rest})
 
 

@@ -166,7 +166,7 @@ class Hits:
         carries = self.ticks > 0 and ("runs" in source or "observer" in source)
         self.rules["2 advance, then jump in one tick"] += carries and fired[0] > 0
         if fired[0] in self._back:
-            beyond = not stepper.get("work.back")
+            beyond = not stepper.get("work.ticks_back")
             self.rules["2 rewind beyond what is kept" if beyond else "2 rewind"] += 1
         self.rules["14 two regions at once"] += sum(map(bool, fired)) > 1
         self.rules["16 guards on the first inputs"] += self.ticks == 0 and any(fired)

@@ -55,7 +55,7 @@ record: {every: 1.5 ms}
 def side_by_side(batch: Batch) -> bool:
     """Tell whether any instance of a planned batch goes side by side."""
     (part,) = CompiledBatch(batch, compile_unoptimised)._parts
-    return "_Abreast(" in emit_simulator_files(part.assembly)["run.h"]
+    return "_Simd(" in emit_simulator_files(part.assembly)["run.h"]
 
 
 def batch_of(system: System, scenario: Scenario, plant: str = "plant", **changes: object) -> Batch:
