@@ -181,9 +181,7 @@ class _ExpectationEvaluator:
                 start = (
                     f" at {_format_time(low)}" if self.expectation.when.after is not None else ""
                 )
-                return self._fail(
-                    f"{text}{start}{early}", high, point_at_or_before(self.run, high)
-                )
+                return self._fail(f"{text}{start}{early}", high, point_at_or_before(self.run, high))
             first = hit if first is None else first
         return self._pass(first)
 
