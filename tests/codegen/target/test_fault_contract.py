@@ -158,7 +158,7 @@ LOWERED: dict[str, tuple[str, object, str]] = {
         "select_transitions_1",
     ),
     "outer modes go before it": (
-        "language.charts.transition_selection.FAULT_FIRST",
+        "language.charts.transition_selection.FAULT_PRIORITY",
         99,
         "select_transitions_1",
     ),

@@ -115,7 +115,7 @@ def test_a_mode_that_breaks_its_contract_is_found(
     assert made["contactor.c"].count(right) == 1
     broken = {**made, "contactor.c": made["contactor.c"].replace(right, wrong)}
     monkeypatch.setattr(
-        "codegen.proofs.acsl.mode_contract.emit_c_files", lambda program, by_amount: broken
+        "codegen.proofs.acsl.mode_contract.emit_c_files", lambda program, by_magnitude: broken
     )
     found = check_contracts(
         load_automaton("contactor", Project(Path())), program("contactor"), tmp_path
@@ -227,8 +227,8 @@ def test_stack_that_is_not_known_is_told(tmp_path: Path) -> None:
 def test_a_state_without_its_range_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing holds w_em any more, so that it may grow without bound."""
 
-    def loosened(program: Program, by_amount: bool) -> dict[str, str]:
-        files = emit_c_files(program, by_amount)
+    def loosened(program: Program, by_magnitude: bool) -> dict[str, str]:
+        files = emit_c_files(program, by_magnitude)
         text, end, product = (
             files["estimator_simple.c"],
             "w_em <= 2400.0)",
