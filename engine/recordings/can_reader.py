@@ -16,7 +16,7 @@ from engine.recordings.recording_file import (
 from language.model.system import RecordingMap
 from language.overlays.expand_document import display_path
 from language.text.diagnostic import MissingToolError, Problems, Source, Span, SpecError
-from language.text.project_files import path_exists, project_root_of, require_inside_project
+from language.text.project_boundary import path_exists, project_root_of, require_inside_project
 
 DATABASE_SUFFIXES = (".dbc", ".arxml", ".kcd", ".sym")
 """Suffixes of files that describe CAN messages; the first is suggested."""

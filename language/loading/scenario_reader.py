@@ -24,7 +24,7 @@ from language.model.system import (
 from language.overlays.expand_document import Project, expand_document
 from language.text.diagnostic import Problems, Span, suggest_name
 from language.text.document import Document, MappingNode, ScalarNode, require_kind
-from language.text.project_files import RECORDINGS_ENV, path_exists, require_inside_project
+from language.text.project_boundary import RECORDINGS_ENV, path_exists, require_inside_project
 
 SCENARIO_KEYS = tuple(
     "language scenario of horizon seed initial inputs pages recording record".split()  # noqa: SIM905

@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from language.text.project_files import ALLOW_OUTSIDE_ENV
+from language.text.project_boundary import ALLOW_OUTSIDE_ENV
 from modewright.cli.commands.a2l import a2l
 from modewright.cli.commands.calibration import calibration
 from modewright.cli.commands.check import check
