@@ -182,7 +182,7 @@ def _run_study(
                     study, out, values, **options, progress=tell, warn=_print_warning
                 )
         except KeyboardInterrupt:
-            _report_kept(out, *done)
+            _report_stored(out, *done)
             raise
         except (OutputError, ClusterError) as error:
             kept = f"{done[0]} of {done[1]} variants are kept; the same command goes on"
@@ -194,7 +194,7 @@ def _run_study(
     return len(found.lost_blocks)
 
 
-def _report_kept(out: Path, now: int, total: int) -> None:
+def _report_stored(out: Path, now: int, total: int) -> None:
     """Print how many variants are stored after an interruption."""
     if total:
         print_error(f"{now} of {total} variants are kept in {out}; the same command goes on")
