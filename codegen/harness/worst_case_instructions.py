@@ -70,7 +70,7 @@ class _LongestPaths:
         for one, after in zip(code, (*code[1:], None), strict=True):
             here = one.target in inside
             edges[one.address] = [one.target] if is_branch(one) and here else []
-            if after and not has_no_fall_through(one):
+            if after and not never_falls_through(one):
                 edges[one.address].append(after.address)
             weights[one.address] = 1 + (self._callee_instructions(one) if is_call(one, here) else 0)
         loops = {one.address: one.loops for one in code}
@@ -191,7 +191,7 @@ def is_call(instruction: Instruction, is_local_target: bool) -> bool:
     return name in ("bl", "blx") or (is_branch(instruction) and not is_local_target)
 
 
-def has_no_fall_through(instruction: Instruction) -> bool:
+def never_falls_through(instruction: Instruction) -> bool:
     """Tell whether the next instruction in memory never follows an instruction.
 
     These are b and bx without a condition, and `pop` and `ldmia` with `pc` among the operands.

@@ -161,7 +161,7 @@ def with_normal_equations(
 
     candidate, prediction = estimate.candidate, estimate.prediction
     jacobian = jacobian or {}
-    fresh = [one.name for one in candidate.compiled.uncertain if one.name not in jacobian]
+    fresh = [one.name for one in candidate.compiled.free_parameters if one.name not in jacobian]
     columns = {**jacobian, **difference_jacobian(candidate, estimate.point, prediction, run, fresh)}
     columns |= _noise_parameter_jacobian(
         estimate, series, [o.name for o in candidate.noise_parameters if o.name not in jacobian]

@@ -50,7 +50,7 @@ class Candidate:
     @cached_property
     def free_parameters(self) -> tuple[FreeParameter, ...]:
         """The free parameters of a fit: the parameters of the model, then the noise parameters."""
-        return self.compiled.uncertain + self.noise_parameters
+        return self.compiled.free_parameters + self.noise_parameters
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -60,17 +60,17 @@ class Candidate:
     @property
     def disturbance_states(self) -> tuple[str, ...]:
         """The names of the disturbance states, in the order of the disturbances."""
-        return self.compiled.drifts
+        return self.compiled.disturbance_states
 
     @cached_property
     def state_ranges(self) -> Reals:
         """The width (high - low, SI) of the range of each state (states,), 1 if it has no range."""
-        return np.array(self.compiled.spans)
+        return np.array(self.compiled.state_ranges)
 
     @cached_property
     def is_effect_state(self) -> NDArray[np.bool_]:
         """The mask (states,) of states that placed effects add (not those of disturbances)."""
-        return np.array(self.compiled.brought, dtype=np.bool_)
+        return np.array(self.compiled.is_effect_state, dtype=np.bool_)
 
     @cached_property
     def is_per_recording(self) -> NDArray[np.bool_]:

@@ -52,12 +52,12 @@ class CompiledModel:
 
     columns: PredictorColumns
     substeps: int
-    spans: tuple[float, ...]
-    uncertain: tuple[FreeParameter, ...]
-    drifts: tuple[str, ...]
+    state_ranges: tuple[float, ...]
+    free_parameters: tuple[FreeParameter, ...]
+    disturbance_states: tuple[str, ...]
     memories: tuple[float, ...]
     delays: tuple[str, ...] = ()
-    brought: tuple[bool, ...] = ()
+    is_effect_state: tuple[bool, ...] = ()
 
 
 def cache_key(*parts: str) -> str:

@@ -100,7 +100,7 @@ def _range_text(channel: Channel, value: float, automaton: Automaton | None, fac
     return f" (its range is {low:g} to {high:g})"
 
 
-def find_time_leaps(recording: Recording) -> list[Finding]:
+def find_long_pauses(recording: Recording) -> list[Finding]:
     """Return an error for the first long pause of time stamps in each window of a recording.
 
     The stamps are those of all channels together; a pause is long from `MAX_PAUSE_FRACTION` (half)

@@ -11,7 +11,7 @@ from diagnosis.quality.excitation import Excitation, analyse_excitation
 from diagnosis.quality.finding import Finding, sort_by_severity
 from diagnosis.quality.free_run import RunFunction, run_interpreter
 from diagnosis.quality.model_agreement import OutputAgreement, compare_with_simulation
-from diagnosis.quality.outlier import drop_huge_values, find_outliers, find_time_leaps
+from diagnosis.quality.outlier import drop_huge_values, find_long_pauses, find_outliers
 from diagnosis.quality.redundant_speeds import find_redundant_speeds
 from diagnosis.quality.reference_model import cached_reference
 from diagnosis.quality.unit_correction import (
@@ -68,7 +68,7 @@ def check_recordings(
     fails.
     """
     early_findings = [
-        f for one in recordings for f in (*find_outliers(one, automaton), *find_time_leaps(one))
+        f for one in recordings for f in (*find_outliers(one, automaton), *find_long_pauses(one))
     ]
     recordings = [drop_huge_values(recording) for recording in recordings]
     channels, findings = _check_channels(recordings, early_findings)

@@ -94,7 +94,7 @@ def format_fitted_quantity(fitted: Quantity) -> str:
     return format_quantity(fitted)
 
 
-def format_rounded(value: float) -> str:
+def format_two_digits(value: float) -> str:
     """Return a number with two significant digits: `100`, not `1e+02`.
 
     Below 1e-4 and from 1e6 on it has an exponent.

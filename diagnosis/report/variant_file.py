@@ -11,7 +11,7 @@ from diagnosis.estimation.quantity import Quantity
 from diagnosis.model.parameter_text import format_value
 from diagnosis.model.placed_effect import automaton_with_effects
 from diagnosis.report.diagnosis_report import DiagnosisReport
-from diagnosis.report.sentences import format_rounded
+from diagnosis.report.sentences import format_two_digits
 from diagnosis.selection.candidate_search import CandidateFit
 from diagnosis.selection.forward_selection import Selection
 from language.model.automaton import Automaton
@@ -104,7 +104,7 @@ def _parameter_lines(automaton: Automaton, fitted: Mapping[str, Quantity]) -> li
         was = float(parameter.value)
         if abs(quantity.value - was) > MIN_RELATIVE_CHANGE * abs(was):
             text = format_value(quantity.value, parameter)
-            note = f"sd {format_rounded(quantity.std)}, declared {was:.6g}"
+            note = f"sd {format_two_digits(quantity.std)}, declared {was:.6g}"
             lines.append(f"  {name}: {{value: {text}}}  # {note}")
     return ["parameters:", *lines] if lines else []
 
@@ -146,7 +146,7 @@ def _single_effect_lines(
         if own not in own_names or placed_effect.qualified_name(own) != final or parameter is None:
             continue
         text = format_value(quantity.value, parameter)
-        note = f"sd {format_rounded(quantity.std)}"
+        note = f"sd {format_two_digits(quantity.std)}"
         if parameter.fitting.per == "recording":
             note = "mean of " + ", ".join(f"{one[final]:.4g}" for one in each)
         values.append(f"      {own}: {text}  # {note}")

@@ -19,7 +19,7 @@ class DelayRecorder:
         self.is_needed = "record" in program.blocks
         self._last: Fraction | None = None
 
-    def start(self) -> None:
+    def forget_last_record(self) -> None:
         """Forget the last recorded time, so that the next step is recorded.
 
         The histories are unchanged; the block `start` fills them.

@@ -82,7 +82,7 @@ class ContinuousRun:
 
         `macro_step` then enters the initial mode (rule 16).
         """
-        self._records.start()
+        self._records.forget_last_record()
         self.stepper.run("latch")
         self.stepper.run("start")
         self.stepper.run("equations")

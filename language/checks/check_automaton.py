@@ -12,8 +12,8 @@ from collections.abc import Iterable, Mapping
 from language.checks.check_action import check_assignments, check_mode_transitions
 from language.checks.check_chart import check_chart
 from language.checks.check_domain import check_domains
-from language.checks.check_guard_overlap import report_overlaps
-from language.checks.check_instant_cycles import report_refiring
+from language.checks.check_guard_overlap import check_guard_overlap
+from language.checks.check_instant_cycles import check_short_cycles
 from language.checks.check_memory import check_memory
 from language.checks.check_number_range import check_ranges
 from language.checks.check_observer import check_observer
@@ -177,8 +177,8 @@ def check_automaton(automaton: Automaton, problems: Problems) -> Automaton:
     check_domains(checked, problems)
     problems.raise_if_errors()
     check_reachability(checked, problems)
-    report_overlaps(checked, QueryEngine(checked), problems)
-    report_refiring(checked, problems)
+    check_guard_overlap(checked, QueryEngine(checked), problems)
+    check_short_cycles(checked, problems)
     if checked.model:
         check_automaton(checked.model, problems)
     problems.raise_if_errors()

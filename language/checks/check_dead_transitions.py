@@ -188,7 +188,7 @@ class _ModeGuards:
         known = [condition for condition in conditions if condition is not None]
         if len(known) < len(conditions):
             return False
-        return self.query_engine.is_unsatisfiable(
+        return self.query_engine.is_proven_unsatisfiable(
             self.query_engine.build_query(self.snapshot.path, known)
         )
 

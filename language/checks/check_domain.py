@@ -212,5 +212,5 @@ class _ModeDomainChecker:
             conditions.append(Compare(OUTSIDE_RELATION[what], value, real(0)))
             query_engine = QueryEngine(self.automaton)
             query = query_engine.build_query(snapshot.path, conditions)
-            return query_engine.is_unsatisfiable(query)
+            return query_engine.is_proven_unsatisfiable(query)
         return False

@@ -21,7 +21,9 @@ MAX_OVERLAPS = 1000
 """Largest number of pairs that are reported in one mode."""
 
 
-def report_overlaps(automaton: Automaton, query_engine: QueryEngine, problems: Problems) -> None:
+def check_guard_overlap(
+    automaton: Automaton, query_engine: QueryEngine, problems: Problems
+) -> None:
     """Report pairs of transitions of one mode with equal priority whose guards may hold together.
 
     A missing priority is 0. Pairs with disjoint events, and guards that are exclusive by form or

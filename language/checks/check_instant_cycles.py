@@ -31,7 +31,7 @@ Cycle = tuple[Transition, ...]
 """Transitions of a cycle; each leads to the source of the next, the last to that of the first."""
 
 
-def report_refiring(automaton: Automaton, problems: Problems) -> None:
+def check_short_cycles(automaton: Automaton, problems: Problems) -> None:
     """Report cycles of one or two transitions that repeat at one instant, with a witness.
 
     Only continuous automata have them. The error is placed at the guard of the last transition that
@@ -44,11 +44,11 @@ def report_refiring(automaton: Automaton, problems: Problems) -> None:
         problems.error("refire", _boundary_transition(automaton, cycle).when.span, label, hint)
 
 
-def check_cycles(automaton: Automaton, problems: Problems) -> None:
+def check_long_cycles(automaton: Automaton, problems: Problems) -> None:
     """Warn of cycles of three or more transitions that repeat at one instant, with a witness.
 
     They have at most MAX_CYCLE_LENGTH transitions. Only continuous automata have them. The place is
-    that of `report_refiring`.
+    that of `check_short_cycles`.
     """
     for cycle, witness in _endless_cycles(automaton, range(3, MAX_CYCLE_LENGTH + 1)):
         label = f"from here the modes change for ever at one instant: {_format_cycle(cycle)}"
@@ -199,7 +199,7 @@ def _can_follow(
         path, guards = path_constraints(automaton, (first, second))
     except (KeyError, SpecError):
         return False
-    return not query_engine.is_unsatisfiable(query_engine.build_query(path, guards))
+    return not query_engine.is_proven_unsatisfiable(query_engine.build_query(path, guards))
 
 
 def path_constraints(automaton: Automaton, cycle: Cycle) -> tuple[SymbolicPath, list[Expr]]:

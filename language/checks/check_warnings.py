@@ -12,7 +12,7 @@ from language.checks.check_dead_transitions import (
     check_dead_transitions,
     check_stuck_modes,
 )
-from language.checks.check_instant_cycles import check_cycles
+from language.checks.check_instant_cycles import check_long_cycles
 from language.checks.check_range_violation import check_range_violations
 from language.checks.check_reachability import check_blocked_modes, check_final_modes
 from language.checks.check_zeno import check_zeno
@@ -34,7 +34,7 @@ def check_warnings(automaton: Automaton, problems: Problems) -> None:
     check_stuck_modes(automaton, dead_transitions, problems)
     check_final_modes(automaton, problems)
     check_close_waits(automaton, query_engine, problems)
-    check_cycles(automaton, problems)
+    check_long_cycles(automaton, problems)
     check_chart_cycles(automaton, query_engine, problems)
     check_zeno(automaton, query_engine, problems)
     check_range_violations(automaton, query_engine, problems)

@@ -17,7 +17,7 @@ from language.expressions.text_rewrite import rename_names, substitute_reads
 from language.overlays.effect_reader import added_names
 from language.overlays.expand_document import expand_document
 from language.overlays.parameter_override import override_parameter
-from language.overlays.tree_types import mode_mappings
+from language.overlays.tree_types import mode_and_template_mappings
 from language.reading.reader import Reader
 from language.text.diagnostic import Problems, Source, suggest_name
 from language.text.document import Document, Entry, MappingNode, ScalarNode, SequenceNode, YamlNode
@@ -157,7 +157,7 @@ class _InstanceReader(Reader):
             return None
         inputs = self.read_mapping(root.get("inputs"), "inputs")
         own = [*added_names(root), *inputs.entries]
-        own += [name for mode in mode_mappings(root) for name in _equation_names(mode)]
+        own += [name for mode in mode_and_template_mappings(root) for name in _equation_names(mode)]
         names = {name: f"{entry.key}_{name}" for name in own}
         return _InstanceDeclaration(entry, options, root, names)
 

@@ -226,7 +226,7 @@ def _point_hint(name: str) -> str:
     return f"give its point: `at: {{{name}: ...}}`"
 
 
-def affine_form(slopes: Mapping[str, SyntaxTree], offset: SyntaxTree) -> SyntaxTree:
+def sum_affine_terms(slopes: Mapping[str, SyntaxTree], offset: SyntaxTree) -> SyntaxTree:
     """Return the sum of slope * column over all columns, in their order, plus the offset."""
     parts = [multiply(slope, Name(column, offset.span)) for column, slope in slopes.items()]
     return reduce(add, [*parts, offset])
@@ -268,7 +268,7 @@ def _linearise_mode(mode: Mode, run: ModelRun, point: LinearisationPoint) -> Mod
             continue
         span = tree.span
         left = FunctionCall("der", (Name(state, span),), span)
-        right = affine_form(slopes.get(state, {}), affine_offset(tree, tuple(flow), point))
+        right = sum_affine_terms(slopes.get(state, {}), affine_offset(tree, tuple(flow), point))
         balances[state] = Balance(state, left, right, mode.flow[state].key)
     if problems.has_errors:
         raise SpecError(problems.reported)

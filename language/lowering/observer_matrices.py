@@ -11,9 +11,9 @@ from language.expressions.syntax_tree import BoolLiteral, Name, NumberLiteral, S
 from language.lowering.linearisation import (
     LinearisationPoint,
     SymbolicMatrix,
-    affine_form,
     affine_offset,
     inline_equations,
+    sum_affine_terms,
     symbolic_jacobian,
     symbolic_rates,
 )
@@ -188,7 +188,7 @@ def _affine_offsets(
                 if not isinstance(constant, NumberLiteral):
                     constants[f"{prefix}.{row}"] = constant
                     constant = Name(f"{prefix}.{row}", tree.span)
-                left = affine_form(slopes, constant)
+                left = sum_affine_terms(slopes, constant)
         if not is_zero(left):
             found[row] = left
     return found, constants

@@ -72,12 +72,12 @@ def build_exp(constants: ExpConstants = EXP_FLOAT64) -> Function:
     """
     body = FunctionBuilder()
     bounded = body.let("bounded", clamp(X, constants.lowest, constants.highest))
-    body.let("y", emit_exp(body, bounded, None, constants))
+    body.let("y", append_exp(body, bounded, None, constants))
     span = f"{constants.lowest.value:g} <= x <= {constants.highest.value:g}"
     return body.build("exp", f"e^x; {span}, clamped; error < 0.95 ULP")
 
 
-def emit_exp(
+def append_exp(
     body: FunctionBuilder, bounded: Ref, rest: Expr | None, constants: ExpConstants
 ) -> Expr:
     """Append the operations of e^(bounded + rest) to a function and return the result expression.

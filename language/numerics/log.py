@@ -69,7 +69,7 @@ def build_log(constants: LogConstants = LOG_FLOAT64) -> Function:
     give the log of the smallest one.
     """
     body = FunctionBuilder()
-    k, f = emit_frexp(body, X, constants)
+    k, f = append_frexp(body, X, constants)
     s = body.let("s", divide(f, add(real(2.0), f)))
     square = body.let("square", multiply(s, s))
     series = body.let("series", multiply(square, horner(constants.series, square)))
@@ -80,7 +80,7 @@ def build_log(constants: LogConstants = LOG_FLOAT64) -> Function:
     return body.build("log", about)
 
 
-def emit_frexp(body: FunctionBuilder, x: Expr, constants: LogConstants) -> tuple[Ref, Ref]:
+def append_frexp(body: FunctionBuilder, x: Expr, constants: LogConstants) -> tuple[Ref, Ref]:
     """Append the decomposition of x and return (k, f): clamped x = 2^k (1 + f), exactly.
 
     x is clamped to the positive normal numbers, and sqrt 1/2 < 1 + f <= sqrt 2. A number below 1 is

@@ -27,8 +27,8 @@ from language.ir.ops import (
     subtract,
 )
 from language.ir.program import Function
-from language.numerics.exp import EXP_FLOAT64, ExpConstants, emit_exp
-from language.numerics.log import LOG_FLOAT64, LogConstants, emit_frexp
+from language.numerics.exp import EXP_FLOAT64, ExpConstants, append_exp
+from language.numerics.log import LOG_FLOAT64, LogConstants, append_frexp
 from language.numerics.sin_cos_tanh import FunctionBuilder, clamp, horner
 
 BASE, DEGREE = Ref("work.base"), Ref("work.degree")
@@ -71,7 +71,7 @@ def build_pow(constants: PowConstants = POW_FLOAT64) -> Function:
     bounded = body.let("bounded_power", clamp(product, exp.lowest, exp.highest))
     is_inside = Compare("==", bounded, product)
     rest = body.let("rest", Select(is_inside, add(error, multiply(y, tail)), real(0.0)))
-    value = emit_exp(body, bounded, rest, exp)
+    value = append_exp(body, bounded, rest, exp)
     is_nought = Binary("and", Compare("<=", BASE, real(0.0)), Compare(">", DEGREE, real(0.0)))
     body.let("y", Select(is_nought, real(0.0), value))
     about = "base^degree; base >= 0, its power within that of exp, clamped; error < 0.95 ULP"
@@ -85,7 +85,7 @@ def _emit_log(
 
     The largest relative error among 40 000 bases is 2^-63, in float32 2^-34 among 20 000 bases.
     """
-    k, f = emit_frexp(body, BASE, constants.log)
+    k, f = append_frexp(body, BASE, constants.log)
     first, *more = (Fraction(2, 2 * n + 3) for n in range(constants.terms))
     large, small = _split_constant(first, constants.number_type)
     s, s_rest = double_words.double_word_quotient("s", f)

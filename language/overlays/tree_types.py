@@ -15,7 +15,7 @@ from language.typecheck.infer import TypeChecker
 from language.typecheck.types import EnumType, ExprType, IntType
 
 
-def mode_mappings(tree: MappingNode) -> Iterator[MappingNode]:
+def mode_and_template_mappings(tree: MappingNode) -> Iterator[MappingNode]:
     """Yield the mappings of all modes and templates of a tree, at any depth, outer ones first.
 
     Modes and templates at the root come before those in regions of the root; regions inside modes
@@ -24,9 +24,9 @@ def mode_mappings(tree: MappingNode) -> Iterator[MappingNode]:
     for key in ("modes", "templates"):
         for entry in _child_mappings(tree.get(key)):
             yield entry
-            yield from mode_mappings(entry)
+            yield from mode_and_template_mappings(entry)
     for region in _child_mappings(tree.get("regions")):
-        yield from mode_mappings(region)
+        yield from mode_and_template_mappings(region)
 
 
 def formula_entries(tree: MappingNode, section: str) -> Iterator[tuple[str, ScalarNode]]:
@@ -35,7 +35,7 @@ def formula_entries(tree: MappingNode, section: str) -> Iterator[tuple[str, Scal
     Templates count as modes. Entries that are no scalars are left out; a name may occur several
     times.
     """
-    for owner in (tree, *mode_mappings(tree)):
+    for owner in (tree, *mode_and_template_mappings(tree)):
         table = owner.get(section)
         for entry in table if isinstance(table, MappingNode) else ():
             if isinstance(entry.node, ScalarNode):

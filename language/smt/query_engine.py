@@ -133,7 +133,7 @@ class QueryEngine:
         wider = self.free_tunables(query) if answer == "never" else None
         return self.answer(wider) if wider else answer
 
-    def is_unsatisfiable(self, query: SolverQuery) -> bool:
+    def is_proven_unsatisfiable(self, query: SolverQuery) -> bool:
         """Return whether it is proven that the conditions never hold, for all tunable values.
 
         Proofs are linear bounds or z3 with SMALL_RESOURCE_LIMIT; answers are cached. The result is

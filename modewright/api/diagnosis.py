@@ -226,7 +226,7 @@ def save_diagnosis(report: DiagnosisReport, out: str | Path, spec: str) -> list[
 
     folder = Path(out)
     make_folder(folder)
-    variant = format_variant(report, base_of(report, spec, folder))
+    variant = format_variant(report, base_reference(report, spec, folder))
     files = {}
     if report.case.thresholds != DEFAULT_THRESHOLDS:
         files[folder / "thresholds.json"] = format_thresholds(report.case.thresholds).encode()
@@ -251,7 +251,7 @@ def _is_input_file(path: Path, report: DiagnosisReport) -> bool:
     return is_recording or path.stem in {effect.name for effect in report.case.effects or ()}
 
 
-def base_of(report: DiagnosisReport, spec: str, folder: Path) -> str:
+def base_reference(report: DiagnosisReport, spec: str, folder: Path) -> str:
     """Return the text by which a variant in `folder` refers to its base `spec`.
 
     This is the name of the base if exactly one file of the project has it, else the path of the

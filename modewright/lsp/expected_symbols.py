@@ -32,7 +32,9 @@ def expected_symbols(symbols: SymbolTable, place: Place, before: str) -> list[Na
     query = re.search(r"\b(in|fault)\(\s*$", before)
     if query:
         return list(
-            all_modes(symbols) if query[1] == "in" else _qualified_symbols(symbols, ("fault",))
+            qualified_modes(symbols)
+            if query[1] == "in"
+            else _qualified_symbols(symbols, ("fault",))
         )
     comparison = re.search(r"([\w.$]+)\s*[!=]=\s*$", before)
     if comparison:
@@ -51,7 +53,7 @@ def expected_symbols(symbols: SymbolTable, place: Place, before: str) -> list[Na
     return _enum_symbols(symbols, assigned_name) if assigned_name else None
 
 
-def all_modes(symbols: SymbolTable) -> Iterator[NamedSymbol]:
+def qualified_modes(symbols: SymbolTable) -> Iterator[NamedSymbol]:
     """Yield the modes by path: own ones, those of instances, those of the model.
 
     The names of the last two have the name of the instance or model and a dot as prefix.

@@ -9,7 +9,7 @@ from rich.table import Table
 
 from diagnosis.pipeline.parameter_fit import STRONG_CORRELATION, Fit
 from diagnosis.report.diagnosis_report import DiagnosisReport, replace_non_finite
-from diagnosis.report.sentences import format_rounded, summary_lines
+from diagnosis.report.sentences import format_two_digits, summary_lines
 from modewright.runtime.json_format import format_entry
 
 
@@ -38,7 +38,8 @@ def print_fit(screen: Console, fit: Fit) -> None:
         quantity = one.quantity
         table.add_row(
             one.name, f"{one.declared:.5g}", f"{quantity.value:.5g}",
-            format_rounded(quantity.std), quantity.unit, f"{one.prior_ratio:.0%}", goes, one.note,
+            format_two_digits(quantity.std), quantity.unit, f"{one.prior_ratio:.0%}", goes,
+            one.note,
         )  # fmt: skip
     screen.print(table)
     for name, misfit in fit.misfits.items():

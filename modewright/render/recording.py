@@ -14,7 +14,7 @@ from diagnosis.quality.channel import ChannelCheck
 from diagnosis.quality.excitation import Excitation
 from diagnosis.quality.finding import format_findings
 from diagnosis.quality.recording import RecordingCheck
-from modewright.render.run import null_nonfinite
+from modewright.render.run import nonfinite_to_none
 from modewright.runtime.json_format import format_entry
 
 STYLES = {"error": "red", "warning": "yellow", "note": "dim"}
@@ -89,13 +89,13 @@ def check_json(check: RecordingCheck) -> dict[str, Any]:
     return {
         **format_entry("recording-check"),
         "usable": check.is_usable,
-        "channels": [null_nonfinite(asdict(one)) for one in check.channels],
+        "channels": [nonfinite_to_none(asdict(one)) for one in check.channels],
         "findings": [asdict(one) for one in check.findings],
         "duration": excitation.duration,
-        "inputs": [null_nonfinite(asdict(one)) for one in excitation.inputs],
-        "speeds": [null_nonfinite(asdict(one)) for one in excitation.speeds],
+        "inputs": [nonfinite_to_none(asdict(one)) for one in excitation.inputs],
+        "speeds": [nonfinite_to_none(asdict(one)) for one in excitation.speeds],
         "effects": {
             e.effect: {"testable": e.is_testable, "needs": e.lacking} for e in excitation.effects
         },
-        "relations": [null_nonfinite(asdict(one)) for one in check.agreements],
+        "relations": [nonfinite_to_none(asdict(one)) for one in check.agreements],
     }

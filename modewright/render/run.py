@@ -244,7 +244,7 @@ def difference_json(difference: RunDifference) -> dict[str, Any]:
         "within": difference.is_within,
         "span": list(difference.span),
         "samples": difference.samples,
-        "signals": [null_nonfinite(vars(item)) for item in difference.signals],
+        "signals": [nonfinite_to_none(vars(item)) for item in difference.signals],
         "mode_windows": [vars(window) for window in difference.windows],
         "transitions": [vars(sequence) for sequence in difference.sequences],
         "only_a": list(difference.only_a),
@@ -266,7 +266,7 @@ def _sequence_line(sequence: ModeSequence) -> str:
     return f"{sequence.instance or 'automaton'}: {counts}, {order_text}"
 
 
-def null_nonfinite(values: Mapping[str, Any]) -> dict[str, Any]:
+def nonfinite_to_none(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return a dict with None in place of infinities and NaN, also in lists and nested lists.
 
     Tuples become lists; nested dicts do not change.

@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from language.text.sanitise import escape_invisible
-from modewright.render.run import null_nonfinite
+from modewright.render.run import nonfinite_to_none
 from modewright.render.study import format_number, interval_text, progress_text
 from modewright.runtime.json_format import format_entry
 from sweep.analysis.sensitivity import MIN_COMPLETE, Index, Sensitivity
@@ -94,7 +94,11 @@ def sensitivity_json(sensitivity: Sensitivity) -> dict[str, Any]:
         "fewest": MIN_COMPLETE,
         "confidence": sensitivity.confidence,
         "indices": [
-            {**asdict(one), "values": null_nonfinite(one.values), "intervals": _intervals_json(one)}
+            {
+                **asdict(one),
+                "values": nonfinite_to_none(one.values),
+                "intervals": _intervals_json(one),
+            }
             for one in sensitivity.indices
         ],
     }
@@ -103,7 +107,7 @@ def sensitivity_json(sensitivity: Sensitivity) -> dict[str, Any]:
 def _intervals_json(index: Index) -> dict[str, Any]:
     """Return the intervals of an index by name."""
     return {
-        name: list(null_nonfinite({"from": pair[0], "to": pair[1]}).values()) if pair else None
+        name: list(nonfinite_to_none({"from": pair[0], "to": pair[1]}).values()) if pair else None
         for name, pair in index.intervals.items()
     }
 

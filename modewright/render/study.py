@@ -13,7 +13,7 @@ from rich.table import Table
 
 from language.expressions.units import display_unit
 from language.text.sanitise import escape_invisible
-from modewright.render.run import null_nonfinite
+from modewright.render.run import nonfinite_to_none
 from modewright.runtime.json_format import format_entry
 from sweep.analysis.summary import Rate, Summary, SummaryLine
 
@@ -71,8 +71,8 @@ def summary_json(summary: Summary) -> dict[str, Any]:
         "counts": dict(summary.counts),
         "failures": [asdict(failure) for failure in summary.failures],
         "confidence": summary.confidence,
-        "measures": [null_nonfinite(asdict(line)) for line in summary.lines],
-        "rates": [null_nonfinite(asdict(rate)) for rate in summary.rates],
+        "measures": [nonfinite_to_none(asdict(line)) for line in summary.lines],
+        "rates": [nonfinite_to_none(asdict(rate)) for rate in summary.rates],
     }
 
 

@@ -33,7 +33,7 @@ def mark_of(manifest: Manifest, block: Block) -> bytes:
     return f"{manifest.digest} {block.start}-{block.stop}".encode()
 
 
-def fault_of(manifest: Manifest, block: Block, data: bytes) -> FileFault:
+def block_file_fault(manifest: Manifest, block: Block, data: bytes) -> FileFault:
     """Return the fault of the file of a block, given its contents.
 
     "" for none; "another" for a file of another study; else "damaged": no digest or a wrong one, no

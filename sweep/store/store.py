@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from language.text.diagnostic import Problems, SpecError
-from sweep.store.block_file import encode_block, fault_of, import_arrow
+from sweep.store.block_file import block_file_fault, encode_block, import_arrow
 from sweep.store.manifest import MANIFEST_NAME, Manifest, encode_manifest, file_span, store_error
 from sweep.store.manifest_reader import read_manifest
 from sweep.store.row import Block, Row
@@ -59,7 +59,7 @@ class Store:
         whole, damaged, problems = [], [], Problems()
         for path, block in self._files():
             try:
-                fault = fault_of(self.manifest, block, path.read_bytes())
+                fault = block_file_fault(self.manifest, block, path.read_bytes())
             except OSError as error:
                 problems.error("store", file_span(path), f"this cannot be read: {error.strerror}")
                 continue

@@ -13,7 +13,7 @@ from language.text.diagnostic import SpecError, sort_problems
 from language.text.sanitise import escape_invisible
 from modewright.cli.common.console import console, progress_spinner, report_written_files
 from modewright.cli.common.exit_codes import EXIT_CODES
-from modewright.cli.common.options import Calibrations, Json, Sets, calibration_title, values_of
+from modewright.cli.common.options import Calibrations, Json, Sets, calibration_name, values_of
 from modewright.runtime.json_format import format_entry
 from modewright.runtime.output_files import OutputError, require_writable, write_files
 
@@ -94,7 +94,7 @@ def import_page(
     from modewright.render import calibration as show_calibration, run as show
 
     _require_format(form)
-    title = calibration_title(out, name, date)
+    title = calibration_name(out, name, date)
     with progress_spinner(f"reading {page}"), _report_problems_as_json(as_json):
         found = import_calibration(page, of, form=form, own_only=own_only)
     write_files({out: found.calibration(title, escape_invisible(page.name), date).encode()})

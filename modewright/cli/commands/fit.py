@@ -11,7 +11,7 @@ import typer
 from modewright.cli.commands.diagnose import Map, Train, report_progress
 from modewright.cli.common.console import console, report_written_files
 from modewright.cli.common.exit_codes import PROBLEMS
-from modewright.cli.common.options import Json, calibration_title, usage_errors
+from modewright.cli.common.options import Json, calibration_name, usage_errors
 from modewright.runtime.output_files import write_files
 
 Anyway = Annotated[bool, typer.Option("--anyway", help="also use recordings with errors")]
@@ -47,7 +47,7 @@ def fit(
     from modewright.api.diagnosis import UnusableRecordings, fit as fit_parameters
     from modewright.render import diagnosis as show_diagnosis, run as show
 
-    title = calibration_title(out, name, date)
+    title = calibration_name(out, name, date)
     chosen = names_of(parameters) if parameters is not None else None
     try:
         with usage_errors():

@@ -14,7 +14,7 @@ from modewright.cli.common.options import (
     Scenario,
     Sets,
     System,
-    exit_if_failed,
+    report_run_end,
     values_of,
 )
 from modewright.runtime.json_format import format_entry
@@ -80,4 +80,4 @@ def lockstep(
         show.print_verdicts(console(), verdicts)
     is_compared = any(verdict.ticks for verdict in verdicts)
     is_equal = is_compared and all(verdict.is_equal for verdict in verdicts)
-    exit_if_failed(trajectory.stopped is not None or not is_equal, trajectory)
+    report_run_end(trajectory.stopped is not None or not is_equal, trajectory)

@@ -14,8 +14,8 @@ from modewright.cli.common.options import (
     Out,
     Plot,
     Sets,
-    exit_if_failed,
     picture_format,
+    report_run_end,
     require_run_format,
     values_of,
 )
@@ -65,4 +65,4 @@ def replay(
     else:
         show.print_replay(console(), replayed)
         report_written_files(list(files))
-    exit_if_failed(verdict is not None and not verdict.is_equal, trajectory)
+    report_run_end(verdict is not None and not verdict.is_equal, trajectory)

@@ -16,8 +16,8 @@ from modewright.cli.common.options import (
     Scenario,
     Sets,
     System,
-    exit_if_failed,
     picture_format,
+    report_run_end,
     require_run_format,
     usage_errors,
     values_of,
@@ -85,7 +85,7 @@ def _report_run(trajectory: Trajectory, files: list[Path], as_json: bool) -> Non
         show.print_json(show.trajectory_json(trajectory))
     else:
         console().print(show.events_table(trajectory.events))
-    exit_if_failed(trajectory.stopped is not None, trajectory)
+    report_run_end(trajectory.stopped is not None, trajectory)
     if not as_json:
         report_written_files(files)
 

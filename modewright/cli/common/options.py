@@ -86,7 +86,7 @@ def usage_errors() -> Iterator[None]:
         raise typer.BadParameter(str(error)) from None
 
 
-def calibration_title(out: Path | None, name: str | None, date: str) -> str:
+def calibration_name(out: Path | None, name: str | None, date: str) -> str:
     """Return the name of a new calibration: `name`, else the stem of the file `out`, else `fitted`.
 
     Raises OutputError if `out` does not end in .yaml, is another kind of spec or cannot be written;
@@ -126,7 +126,7 @@ def picture_format(path: Path) -> str:
     return path.suffix.lower()[1:]
 
 
-def exit_if_failed(failed: bool, trajectory: Trajectory) -> None:
+def report_run_end(failed: bool, trajectory: Trajectory) -> None:
     """Print latched faults and the reason of a stop to stderr; exit with code PROBLEMS if `failed`.
 
     Faults and a stop alone do not change the exit code.

@@ -26,7 +26,7 @@ import modewright as mw
 from diagnosis.estimation.checkpoint import FitCache, hash_of
 from diagnosis.report.diagnosis_report import verdict_to_json
 from diagnosis.report.variant_file import missing_effect_notes
-from modewright.api.diagnosis import base_of
+from modewright.api.diagnosis import base_reference
 from tests.diagnosis.rotor_project import (
     COMMAND,
     RIDER,
@@ -198,8 +198,8 @@ def test_a_spec_that_is_a_file_anywhere_is_extended_as_a_file(
     shutil.copy("spec/spinner.yaml", "other.yaml")
     elsewhere = dataclasses.replace(dossier.automaton, name="other")
     alone = dataclasses.replace(dossier, automaton=elsewhere)
-    assert base_of(alone, "other.yaml", Path("found")) == "../other.yaml"
-    assert base_of(dossier, "spec/spinner.yaml", Path("found")) == "spinner"
+    assert base_reference(alone, "other.yaml", Path("found")) == "../other.yaml"
+    assert base_reference(dossier, "spec/spinner.yaml", Path("found")) == "spinner"
 
 
 def test_an_effect_that_the_project_does_not_have_is_asked_for(dossier: mw.DiagnosisReport) -> None:

@@ -15,7 +15,7 @@ import pytest
 
 from language.text.diagnostic import SpecError
 from sweep.execution.study_run import run_study
-from sweep.store.block_file import fault_of
+from sweep.store.block_file import block_file_fault
 from sweep.store.manifest import MANIFEST_NAME, seal_of
 from sweep.store.store import Store, read_store
 from tests.sweep.execution.test_study_run import bytes_of
@@ -157,10 +157,10 @@ def test_any_flipped_bit_of_a_block_is_seen(out: Path) -> None:
     store = read_store(out)
     path, block = store.paths()[1], store.manifest.blocks[1]
     data = path.read_bytes()
-    assert fault_of(store.manifest, block, data) == ""
+    assert block_file_fault(store.manifest, block, data) == ""
     for place in np.random.default_rng(1).integers(0, len(data), 300).tolist():
         flipped = data[:place] + bytes([data[place] ^ 4]) + data[place + 1 :]
-        assert fault_of(store.manifest, block, flipped) == "damaged", place
+        assert block_file_fault(store.manifest, block, flipped) == "damaged", place
 
 
 def test_a_block_with_a_corrupt_body_is_told_and_computed_again(out: Path) -> None:
@@ -183,7 +183,7 @@ def test_a_block_without_a_digest_is_damaged(out: Path) -> None:
     table = pyarrow.parquet.read_table(path)
     kept = {key: text for key, text in table.schema.metadata.items() if key != b"digest"}
     pyarrow.parquet.write_table(table.replace_schema_metadata(kept), path, compression="zstd")
-    assert fault_of(store.manifest, block, path.read_bytes()) == "damaged"
+    assert block_file_fault(store.manifest, block, path.read_bytes()) == "damaged"
 
 
 def test_blocks_of_another_study_are_refused_and_left_where_they_are(
