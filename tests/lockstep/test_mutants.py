@@ -12,6 +12,8 @@ from tests.lockstep.random_specs.mutant import Mutant
 from tests.lockstep.random_specs.mutants import INTERPRETER
 from tests.lockstep.random_specs.reference_runs import ReferenceRun, find_killing_spec
 
+pytestmark = pytest.mark.long
+
 MUTANTS = (*INTERPRETER, *GENERATOR)
 
 

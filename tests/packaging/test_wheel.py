@@ -24,6 +24,8 @@ from rename_imports import wheel_name
 from sweep.execution.fingerprint import fingerprint
 from tests.diagnosis.rotor_project import COMMAND, write_project
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).parents[2]
 TRACE = ROOT / "tests" / "data" / "paper" / "est_paper_tip_out_1kHz.csv.gz"
 STUDIES = ROOT / "tests" / "data" / "studies"
@@ -216,13 +218,11 @@ print(len([importlib.import_module(name) for name in names if not name.endswith(
 """
 
 
-@pytest.mark.long
 def test_every_module_of_the_wheel_can_be_imported(python: Path, folder: Path) -> None:
     told = run([python, "-P", "-c", EVERY_MODULE], folder)
     assert int(told) >= len(LAYOUT.names.modules) - 2
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -261,7 +261,6 @@ def framed(*messages: dict[str, object]) -> str:
     return "".join(f"Content-Length: {len(text)}\r\n\r\n{text}" for text in texts)
 
 
-@pytest.mark.long
 def test_the_language_server_and_its_background_process_start(python: Path, folder: Path) -> None:
     start: dict[str, object] = {"processId": None, "rootUri": None, "capabilities": {}}
     given = framed(

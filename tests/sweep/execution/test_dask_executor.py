@@ -36,6 +36,8 @@ from tests.sweep.failing_workers import (
 )
 from tests.sweep.prepared_studies import QUICK_EXECUTOR, make_study, quick_results
 
+pytestmark = pytest.mark.long
+
 STAFF = WorkerSetup(own_fingerprint)
 NONE = Credentials()
 PEM = ("cert", "key")

@@ -30,6 +30,8 @@ from tests.codegen.exchange.fmi.importer import (
 from tests.codegen.waiting import waiting_automaton
 from tests.language.build import program as made
 
+pytestmark = pytest.mark.long
+
 TICKS = {"estimator": 2101, "supervisor": 2001, "estimator_float32": 1000, "driveline": 1000}
 """Ticks that are compared, and steps of the continuous one."""
 EVERY = 5
@@ -71,7 +73,6 @@ def _set(stepper: Interpreter, program: Program, name: str, value: float) -> Non
         stepper.set(full, int(value) if kind == "whole" else value)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("name", TICKS)
 def test_an_fmu_gives_the_bits_of_the_engine(
     name: str, version: Version, ready: Ready, tapes: dict[str, TickLog]
