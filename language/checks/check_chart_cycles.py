@@ -137,8 +137,6 @@ def _find_endless_witness(
     moving = (AGE_PREFIXES if cycle[0].targets else ()) + (DELAYED_PREFIXES if still else ())
     if not _is_constant_in_tick(automaton, query.variables, moving):
         return None
-    if not query.variables:
-        return Witness({}, "") if query.holds_at({}) else None
     answer = query_engine.answer(query)
     return answer if isinstance(answer, Witness) else None
 

@@ -43,10 +43,10 @@ def check_range_violations(
                 except (KeyError, SpecError):
                     continue
                 if witness:
-                    label = f"`{name}` may be past its range of {_format_range(target)} here"
-                    hint = (
-                        f"at {witness.text} in SI; limit the value with `clip`, or widen the range"
-                    )
+                    verb = "may be" if witness.text else "is"
+                    label = f"`{name}` {verb} past its range of {_format_range(target)} here"
+                    at = f"at {witness.text} in SI; " if witness.text else ""
+                    hint = f"{at}limit the value with `clip`, or widen the range"
                     problems.warning("past", formula.span, label, hint)
 
 

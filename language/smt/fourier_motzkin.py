@@ -22,9 +22,12 @@ def is_infeasible(inequalities: Sequence[Inequality]) -> bool:
 
     The result is False if a solution exists or if more than MAX_INEQUALITIES inequalities arise.
     The variable that creates the fewest new inequalities is eliminated first, ties by name.
-    Coefficients must not be 0.
+    A variable with the coefficient 0 does not occur.
     """
-    remaining = list(inequalities)
+    remaining = [
+        (_without_zeros(factors), constant, is_strict)
+        for factors, constant, is_strict in inequalities
+    ]
     while len(remaining) <= MAX_INEQUALITIES:
         if any(_is_contradiction(inequality) for inequality in remaining):
             return True
@@ -73,5 +76,9 @@ def _combine(name: str, first: Inequality, second: Inequality) -> Inequality:
     factors = {other: a * value for other, value in first[0].items()}
     for other, value in second[0].items():
         factors[other] = factors.get(other, Fraction(0)) + b * value
-    nonzero = {other: value for other, value in factors.items() if value}
-    return nonzero, a * first[1] + b * second[1], first[2] or second[2]
+    return _without_zeros(factors), a * first[1] + b * second[1], first[2] or second[2]
+
+
+def _without_zeros(factors: Mapping[str, Fraction]) -> dict[str, Fraction]:
+    """Return the coefficients that are not 0."""
+    return {name: value for name, value in factors.items() if value}

@@ -109,8 +109,8 @@ class QueryEngine:
 
         The methods are tried in this order: linear bounds, `first_sample_points`, z3 (at most
         MAX_SOLVER_QUERIES in this engine), and if z3 finds no confirmed solution
-        `all_sample_points` (at most MAX_SEARCHED_POINTS). A query without variables has no witness:
-        if it is not disproved, it is "open".
+        `all_sample_points` (at most MAX_SEARCHED_POINTS). The witness of a query without variables
+        is empty.
         """
         narrower = narrow_domains(query)
         if narrower is None:
@@ -121,7 +121,7 @@ class QueryEngine:
             if isinstance(decided, str) and decided == "never":
                 return decided
             valuation = self._search_points(query) if isinstance(decided, str) else decided
-        return _build_witness(query, valuation) if valuation else "open"
+        return "open" if valuation is None else _build_witness(query, valuation)
 
     def answer_for_all_tunables(self, query: SolverQuery) -> Witness | Verdict:
         """Return the answer for the present values of tunable parameters.

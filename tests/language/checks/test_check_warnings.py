@@ -248,3 +248,17 @@ def test_flows_that_lead_back_at_once(
 ) -> None:
     text = ZENO.format(force_a=force_a, force_b=force_b, first=first, second=second)
     assert kinds(tmp_path, text) == expected
+
+
+@pytest.mark.parametrize(("value", "expected"), [("5 m", ["past"]), ("2 m", [])])
+def test_a_constant_outside_of_the_range_of_its_target_is_reported(
+    tmp_path: Path, value: str, expected: list[str]
+) -> None:
+    text = HEAD.format(first="when: x > 1 m", second="when: x > 2 m")
+    text = text.replace(
+        "initial: a", "discrete: {last: {unit: m, initial: 0 m, range: [-3, 3]}}\ninitial: a"
+    )
+    text = text.replace("b: {transitions", f"b: {{entry: {{last: {value}}}, transitions")
+    text = text.replace("outputs: [mode]", "outputs: [mode, last]")
+    found = kinds(tmp_path, text.replace("x > 2 m, priority: 2", "x < -2 m, priority: 2"))
+    assert found == expected

@@ -90,6 +90,27 @@ def test_a_bare_guard_is_refused(guard: str) -> None:
     assert "write the direction of motion too" in problem.help
 
 
+def test_a_cycle_of_guards_without_variables_is_refused() -> None:
+    (problem,) = raised_problems(
+        lambda: automaton(stop(arrive("true", "{x: 0 m}"), "free: {when: true}"))
+    )
+    assert problem.label == "this fires again at the same instant, for ever: " + (
+        "`free` -> `stopped` -> `free`"
+    )
+    assert problem.help.startswith("write the direction of motion too")
+
+
+def test_the_witness_of_guards_without_variables_is_empty() -> None:
+    made = automaton(stop(both("limit > 0 m", "true"), ""))
+    assert together(made) == {}
+
+
+def test_guards_without_variables_that_hold_together_are_both_enabled() -> None:
+    text = stop("p: {to: stopped, when: limit > 0 m}, q: {to: stopped, when: true}", "")
+    (problem,) = raised_problems(lambda: automaton(text))
+    assert problem.label == "`p` and `q` are both enabled at one instant"
+
+
 def test_the_bare_guard_is_the_one_that_is_pointed_at() -> None:
     text = stop(arrive("x >= limit"))
     (problem,) = raised_problems(lambda: automaton(text))
