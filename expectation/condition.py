@@ -43,9 +43,10 @@ from language.expressions.units import PURE_NUMBER, SECOND, are_compatible
 from language.loading.signal_types import signal_types
 from language.model.declaration import Formula
 from language.model.system import System
-from language.text.diagnostic import Problems, suggest_name
+from language.text.diagnostic import Problems, Span, suggest_name
 from language.text.document import ScalarNode
 from language.typecheck.environment import NameEnvironment
+from language.typecheck.function_calls import alternatives_hint
 from language.typecheck.infer import TypeChecker
 from language.typecheck.types import EnumType, ExprType, IntType
 
@@ -167,10 +168,14 @@ class _NameResolver:
                     if place:
                         stay = self._resolve_mode_comparison(place, name)
                         return stay if tree.operator == "==" else Not(stay, span)
-            case FunctionCall("in", arguments, _):
-                return self._resolve_in(tree, arguments)
-            case FunctionCall("fault", arguments, _):
-                return self._resolve_fault(tree, arguments)
+            case FunctionCall(("in" | "fault") as function, (_, _, *_), span):
+                label = f"`{function}` takes 1 argument(s), not {len(tree.arguments)}"
+                self._error("arguments", tree, label, alternatives_hint(function))
+                return ErrorNode(span)
+            case FunctionCall("in", (argument,), _):
+                return self._resolve_in(tree, argument)
+            case FunctionCall("fault", (argument,), span):
+                return self._resolve_fault(argument, span)
             case FunctionCall(function, _, _) if function in RUNNING_FUNCTIONS:
                 return self._resolve_running(tree)
             case Name():
@@ -198,46 +203,47 @@ class _NameResolver:
         self._error("name", tree, f"`{name}` is not a mode of `{format_region(region_ref)}`", hint)
         return ErrorNode(tree.span)
 
-    def _resolve_in(self, tree: FunctionCall, arguments: tuple[SyntaxTree, ...]) -> SyntaxTree:
+    def _resolve_in(self, tree: FunctionCall, argument: SyntaxTree) -> SyntaxTree:
         """Return the name of the predicate `in(mode)`; an error node if the mode is unknown."""
-        path = arguments[0].path if len(arguments) == 1 and isinstance(arguments[0], Name) else ""
+        path = argument.path if isinstance(argument, Name) else ""
         stay = self.reader.modes.get(path)
         if stay is None:
             label = f"`{path}` is not a mode of an instance of `{self.reader.system.name}`"
             hint = suggest_path(path, self.reader.modes)
-            self._error("name", arguments[0] if arguments else tree, label, hint)
+            self._error("name", argument, label, hint)
             return ErrorNode(tree.span)
         return self._add_mode_predicate(stay, path, tree)
 
-    def _resolve_fault(self, tree: FunctionCall, arguments: tuple[SyntaxTree, ...]) -> SyntaxTree:
+    def _resolve_fault(self, argument: SyntaxTree, span: Span) -> SyntaxTree:
         """Return the name of one bit of a fault word, e.g. `fault(est.range_T)`.
 
         The instance may be omitted if there is only one. Reports unknown faults, and fault words
         that are not outputs.
         """
-        path = arguments[0].path if len(arguments) == 1 and isinstance(arguments[0], Name) else ""
+        path = argument.path if isinstance(argument, Name) else ""
         system = self.reader.system
         head, _, name = path.rpartition(".")
         instance = head or system.sole_instance or ""
         bits = fault_bits(system, instance)
-        at = arguments[0] if arguments else tree
         if name not in bits:
             label = f"`{path}` is not a fault of an instance of `{system.name}`"
             known = [
                 f"{each}.{bit}" for each in system.instances for bit in fault_bits(system, each)
             ]
-            self._error("name", at, label, suggest_path(path, [*bits, *known]))
-            return ErrorNode(tree.span)
+            self._error("name", argument, label, suggest_path(path, [*bits, *known]))
+            return ErrorNode(span)
         signal = next((word for word, of in self.reader.words.items() if of == instance), None)
         if signal is None:
             automaton = system.instances[instance].automaton.name
             label = f"the faults of `{instance}` are not an output"
-            self._error("missing", at, label, f"add `faults` to the `outputs` of `{automaton}`")
-            return ErrorNode(tree.span)
+            self._error(
+                "missing", argument, label, f"add `faults` to the `outputs` of `{automaton}`"
+            )
+            return ErrorNode(span)
         made = f"fault {instance} {name}"
         self.flags[made] = FaultFlag(signal, bits[name])
         self.kinds[made] = "truth"
-        return Name(made, tree.span)
+        return Name(made, span)
 
     def _add_mode_predicate(
         self, predicate: ModePredicate, mode: str, at: SyntaxTree

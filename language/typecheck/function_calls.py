@@ -81,14 +81,19 @@ def infer_function_call(checker: TypingContext, tree: FunctionCall) -> ExprType 
 
 
 def argument_count_error(tree: FunctionCall) -> str:
-    """Return a message if an elementary function has a wrong number of arguments; else empty.
+    """Return a message if an elementary function or `in` has a wrong number of arguments.
 
-    The message is like "`sin` takes 1 argument(s), not 2". It is empty for a function that is not
-    in ARGUMENT_COUNTS.
+    The message is like "`sin` takes 1 argument(s), not 2". It is empty if the number is correct and
+    for every other function.
     """
-    expected, actual = ARGUMENT_COUNTS.get(tree.function), len(tree.arguments)
+    expected, actual = {**ARGUMENT_COUNTS, "in": 1}.get(tree.function), len(tree.arguments)
     is_correct = expected is None or actual == expected
     return "" if is_correct else f"`{tree.function}` takes {expected} argument(s), not {actual}"
+
+
+def alternatives_hint(function: str) -> str:
+    """Return the help text for a truth function of one name that has several, like `in(a, b)`."""
+    return f"write `{function}(a) or {function}(b)` if one of two is meant"
 
 
 def is_integer_call(arguments: Sequence[SyntaxTree], are_integers: Sequence[bool]) -> bool:
@@ -158,9 +163,14 @@ def _infer_elementary(
 
 
 def _infer_in(checker: TypingContext, tree: FunctionCall) -> ExprType:
-    """Return the type of `in(mode)`; report an argument that is not a mode of a run or a region."""
+    """Return the type of `in(mode)`.
+
+    Report more than one argument, and an argument that is not a mode of a run or a region.
+    """
     name = tree.arguments[0]
-    if not isinstance(name, Name) or name.path not in checker.environment.modes:
+    if label := argument_count_error(tree):
+        checker.report("arguments", tree.span, label, alternatives_hint("in"))
+    elif not isinstance(name, Name) or name.path not in checker.environment.modes:
         shown = name.path if isinstance(name, Name) else "..."
         label = f"`in({shown})` does not name a mode of the run of this mode or of a region"
         hint = suggest_name(shown, checker.environment.modes)
