@@ -18,14 +18,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.data.noise_estimate import noise_of
+from diagnosis.data.time_resolution import time_resolution
 from engine.recordings.recording import Channel, Recording, split_by_windows
 from language.model.automaton import Automaton
 from language.model.graphs import reachable
 from language.model.system import RecordingMap
 
 Reals = NDArray[np.float64]
+MAX_SLIP = Fraction(1, 10)
+"""Slip of the grid against the last time stamp, in periods."""
+MAX_SHARED_SLIP = Fraction(1, 4)
+"""Slip at the end of a recording, in periods, with which it shares the grid of another one."""
 DECIMATED_PERIOD = Fraction(5, 1000)
-"""Period [s] to which faster recordings are decimated."""
+"""Longest period [s] to which faster recordings are decimated."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +132,7 @@ def sample_recording(
     start = _first_common_stamp(
         [output_channels[name] for name in output_names if name in output_channels], used
     )
-    step = period or min(grid_period(channel.seconds) for channel in used)
+    step = period or min(grid_period(channel.times) for channel in used)
     count = int((end - start) / step) + 1
     if count < 2:
         raise ValueError(f"{recording.name}: only {count} samples in common")
@@ -178,7 +183,26 @@ def resample(
         return tuple(
             dataclasses.replace(one, is_first_order_hold=is_first_order_hold) for one in series
         )
-    return tuple(decimate(one, is_first_order_hold) for one in series)
+    longest = time_resolution(automaton, DECIMATED_PERIOD)
+    return tuple(decimate(one, is_first_order_hold, longest) for one in series)
+
+
+def share_period(
+    series: Sequence[SampledRecording], period: Fraction | None = None
+) -> tuple[SampledRecording, ...]:
+    """Return recordings with one period, where they differ by the rounding of stamps alone.
+
+    The period is the given one [s], or that of the recording with most samples. A recording keeps
+    its own period if its last sample would move by more than `MAX_SHARED_SLIP` of a period.
+    """
+    if period is None:
+        period = max(series, key=lambda one: one.count).period
+    return tuple(
+        dataclasses.replace(one, period=period)
+        if abs(one.period - period) * one.count <= MAX_SHARED_SLIP * period
+        else one
+        for one in series
+    )
 
 
 def require_equal_periods(series: Sequence[SampledRecording]) -> None:
@@ -192,16 +216,20 @@ def require_equal_periods(series: Sequence[SampledRecording]) -> None:
         raise ValueError(f"recordings at different rates cannot be diagnosed together: {named}")
 
 
-def decimate(series: SampledRecording, is_first_order_hold: bool = False) -> SampledRecording:
-    """Return a recording decimated by an integer factor n, to a period of at most 5 ms.
+def decimate(
+    series: SampledRecording,
+    is_first_order_hold: bool = False,
+    longest: Fraction = DECIMATED_PERIOD,
+) -> SampledRecording:
+    """Return a recording decimated by an integer factor n, to a period of at most `longest` [s].
 
-    n is `DECIMATED_PERIOD` over the period, rounded down and at least 1; samples after the last
+    n is `longest` over the period, rounded down and at least 1; samples after the last
     full group of n are dropped. Outputs are the first of each n samples (no filter). A held input
     is the mean of the n samples; an input with first-order hold is the mean over a centred window
-    of n samples (n + 1 if n is even), with the edge values repeated. Driveline dynamics are slower
-    than this period, and the cost of a fit is proportional to the number of samples.
+    of n samples (n + 1 if n is even), with the edge values repeated. The cost
+    of a fit is proportional to the number of samples.
     """
-    factor = max(1, int(DECIMATED_PERIOD / series.period))
+    factor = max(1, int(longest / series.period))
     count = series.count // factor
     inputs = series.inputs[: count * factor]
     if is_first_order_hold and factor > 1:
@@ -220,16 +248,33 @@ def decimate(series: SampledRecording, is_first_order_hold: bool = False) -> Sam
     )
 
 
-def grid_period(times: Reals) -> Fraction:
-    """Return the median difference [s] of time stamps; 1/n if a whole rate n [Hz] is within 2 %.
+def grid_period(times: Sequence[Fraction]) -> Fraction:
+    """Return the period [s] of a uniform grid through increasing time stamps (at least two).
 
-    Otherwise it is a fraction with a denominator of at most 1 000 000. Needs at least two stamps.
+    The median difference tells how many periods lie between neighbouring stamps, so that gaps and
+    jitter do not count; the period is the duration over their sum. The result is the simplest
+    fraction with which the last stamp moves by at most `MAX_SLIP` (a tenth) of a period.
     """
-    usual = float(np.median(np.diff(times)))
-    rate = round(1.0 / usual)
-    if rate > 0 and abs(rate * usual - 1.0) < 0.02:
-        return Fraction(1, rate)
-    return Fraction(usual).limit_denominator(1_000_000)
+    seconds = np.array([float(time) for time in times])
+    differences = np.diff(seconds)
+    usual = float(np.median(differences))
+    count = int(np.sum(np.maximum(np.rint(differences / usual), 1.0)))
+    period = (times[-1] - times[0]) / count
+    slip = MAX_SLIP * period / count
+    return simplest_fraction(period - slip, period + slip)
+
+
+def simplest_fraction(low: Fraction, high: Fraction) -> Fraction:
+    """Return the fraction with the smallest denominator in an interval, 0 < low <= high.
+
+    The continued fractions of both ends agree up to the partial quotient that is shortened.
+    """
+    whole = low.numerator // low.denominator
+    if low == whole:
+        return Fraction(whole)
+    if whole + 1 <= high:
+        return Fraction(whole + 1)
+    return whole + 1 / simplest_fraction(1 / (high - whole), 1 / (low - whole))
 
 
 def _first_common_stamp(
@@ -241,7 +286,7 @@ def _first_common_stamp(
     It is the time at which the last channel begins if the fastest channel has no later stamp.
     """
     common = max(channel.times[0] for channel in used_channels)
-    fastest = min(compared_channels, key=lambda channel: grid_period(channel.seconds))
+    fastest = min(compared_channels, key=lambda channel: grid_period(channel.times))
     return next((time for time in fastest.times if time >= common), common)
 
 

@@ -15,6 +15,7 @@ from importlib import resources
 from pathlib import Path
 
 from diagnosis.data.sampled_recording import has_feedthrough
+from diagnosis.data.time_resolution import time_resolution
 from language.expressions.units import parse_unit
 from language.ir.program import Program
 from language.loading.load import automaton_of, program_of
@@ -25,7 +26,6 @@ from language.overlays.effect_place import PlaceMismatch, find_effect_place
 from language.overlays.effect_reader import Effect, EffectApplication, added_names, read_effect
 from language.overlays.expand_document import Project, read_document
 from language.overlays.tree_types import formula_entries
-from language.programs.continuous_program import stable_step_limits
 from language.text.diagnostic import Problems, Source, Span
 from language.text.document import Document, MappingNode, ScalarNode
 
@@ -46,9 +46,6 @@ PLACE_KIND_BY_SECTION = {
 
 MAX_STEP = Fraction(5, 1000)
 """Longest major step [s] of a prediction; events inside a step are located."""
-
-STABLE_FRACTION = Fraction(1, 2)
-"""A step is at most this fraction of the largest stable one, because a fit changes parameters."""
 
 PARAMETER_FACTOR = Fraction(4)
 """Factor by which an effect's parameter may change in a fit, for the choice of a stable step."""
@@ -188,18 +185,18 @@ def lower_tunable_program(
     """Return the Program in which `names` are tunable, and the major steps in a period [s].
 
     The step divides the period into at least `min_substeps` and at most `MAX_STEPS` (40) parts and
-    is at most `MAX_STEP` (5 ms). It is at most half the largest stable step at the declared
-    parameters and with those of `effect_parameters` at a quarter and four times their values
-    (within their ranges), and not longer than any nonzero time among these: the stability limit of
-    a limited rate is not known beforehand.
+    is at most `MAX_STEP` (5 ms). It is at most the `time_resolution` at the declared parameters and
+    with those of `effect_parameters` at a quarter and four times their values (within their
+    ranges), and not longer than any nonzero time among these: the eigenvalue of a limited rate is
+    not known beforehand.
     """
     scaled = [
         _scale_parameters(automaton, effect_parameters, factor)
         for factor in (PARAMETER_FACTOR, 1 / PARAMETER_FACTOR)
     ]
     variants = [one for one in scaled if one.parameters != automaton.parameters]
-    stable = [_stable_step(one, MAX_STEP) for one in (automaton, *variants)]
-    longest = min(*stable, *_time_values(automaton, effect_parameters), MAX_STEP)
+    accurate = [time_resolution(one, MAX_STEP) for one in (automaton, *variants)]
+    longest = min(*accurate, *_time_values(automaton, effect_parameters), MAX_STEP)
     substeps = min(max(min_substeps, -(-period // longest)), MAX_STEPS)
     parameters = {
         name: dataclasses.replace(parameter, kind="tunable") if name in names else parameter
@@ -240,14 +237,6 @@ def minimum_substeps(
         automaton, output_names
     )
     return MIN_DELAY_STEPS if is_short else 1
-
-
-def _stable_step(automaton: Automaton, max_step: Fraction) -> Fraction:
-    """Return the step [s] that is stable for an automaton, at most `max_step` and at least 1 us."""
-    for limit in () if automaton.is_sampled else stable_step_limits(automaton):
-        stable = Fraction(limit.step).limit_denominator(10**9) if limit.step < 1.0 else Fraction(1)
-        max_step = min(max_step, STABLE_FRACTION * stable)
-    return max(max_step, Fraction(1, 10**6))
 
 
 def _scale_parameters(automaton: Automaton, names: Sequence[str], factor: Fraction) -> Automaton:

@@ -11,12 +11,18 @@ import hashlib
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 
 from diagnosis.criterion.threshold import DEFAULT_THRESHOLDS, Thresholds
-from diagnosis.data.sampled_recording import SampledRecording, compared_outputs, resample
+from diagnosis.data.sampled_recording import (
+    SampledRecording,
+    compared_outputs,
+    resample,
+    share_period,
+)
 from diagnosis.equation.discovery import DiscoveredEquation
 from diagnosis.estimation.covariance import quantities_of
 from diagnosis.estimation.estimate import Estimate
@@ -84,7 +90,9 @@ def diagnose(case: Case, log: LogCallback = lambda text: None) -> Diagnosis:
     seen = compared_outputs(case.mapping, automaton)
     if not seen:
         raise ValueError(f"map `{case.mapping.name}` compares no output of `{automaton.name}`")
-    series = [one for path in case.train for one in read_series(path, case, automaton, seen)]
+    series = share_period(
+        [one for path in case.train for one in read_series(path, case, automaton, seen)]
+    )
     raw = build_model_set(case, automaton, series, seen)
     recalibrated = recalibrate_by_hold(raw, log)
     decision = decide(case, raw, recalibrated, log)
@@ -108,7 +116,7 @@ def diagnose(case: Case, log: LogCallback = lambda text: None) -> Diagnosis:
         verdict, inputs=hashes, messages=(format_location(locations, model_set),)
     )
     held_out, unread = _read_held_out(
-        case, automaton, seen, model_set.series[0].is_first_order_hold
+        case, automaton, seen, model_set.series[0].is_first_order_hold, series[0].period
     )
     for text in unread:
         log(text)
@@ -128,7 +136,11 @@ def diagnose(case: Case, log: LogCallback = lambda text: None) -> Diagnosis:
 
 
 def _read_held_out(
-    case: Case, automaton: Automaton, output_names: Sequence[str], is_first_order_hold: bool
+    case: Case,
+    automaton: Automaton,
+    output_names: Sequence[str],
+    is_first_order_hold: bool,
+    period: Fraction,
 ) -> tuple[tuple[SampledRecording, ...], tuple[str, ...]]:
     """Return the held-out recordings, and a message for each file that cannot be used.
 
@@ -143,12 +155,10 @@ def _read_held_out(
             unread.append(f"{named}: it is a copy of {case.name_of(known)}")
             continue
         try:
-            recordings += resample(
-                read_series(path, case, automaton, output_names),
-                automaton,
-                output_names,
-                is_first_order_hold,
-            )
+            shared = share_period(read_series(path, case, automaton, output_names), period)
+            if any(one.period != period for one in shared):
+                raise ValueError(f"its rate is not that of training, {float(1 / period):g} Hz")
+            recordings += resample(shared, automaton, output_names, is_first_order_hold)
         except (SpecError, ValueError) as error:
             why = error.problems[0].label if isinstance(error, SpecError) else str(error)
             unread.append(f"{case.name_of(path)} was held out and cannot be used: {why}")

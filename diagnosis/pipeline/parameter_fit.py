@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from diagnosis.data.sampled_recording import compared_outputs
+from diagnosis.data.sampled_recording import compared_outputs, share_period
 from diagnosis.estimation.covariance import correlations_of, quantities_of
 from diagnosis.estimation.estimate import Estimate, evaluate
 from diagnosis.estimation.quantity import Quantity
@@ -118,7 +118,9 @@ def fit(
     if not seen:
         raise ValueError(f"map `{case.mapping.name}` compares no output of `{automaton.name}`")
     case = dataclasses.replace(case, effects=())
-    series = [one for path in case.train for one in read_series(path, case, automaton, seen)]
+    series = share_period(
+        [one for path in case.train for one in read_series(path, case, automaton, seen)]
+    )
     model_set, estimate = best_hold(
         recalibrate_by_hold(build_model_set(case, automaton, series, seen), log)
     )

@@ -22,6 +22,7 @@ from diagnosis.data.sampled_recording import (
     require_equal_periods,
     resample,
     sample_windows,
+    share_period,
 )
 from diagnosis.estimation.estimate import Estimate, evaluate
 from diagnosis.estimation.innovations import measured_noise_levels, predict_at_points
@@ -113,7 +114,7 @@ def find_clock_and_sign_errors(
         for recording in recordings
         for one in sample_windows(recording, mapping, automaton, seen)
     ]
-    series = list(resample(series, automaton, seen, False))
+    series = list(resample(share_period(series), automaton, seen, False))
     drifts = balance_disturbances(document, automaton)
     model_set = ModelSet(document, project, automaton, (), tuple(series), seen, drifts)
     try:
