@@ -40,27 +40,34 @@ CURVES: Mapping[str, Sequence[int]] = {
     "workers": (1, 2, 4),
 }
 ABOUT = {
-    "states": "a chain of inertias with two states each and three modes: reading, checking and "
-    "lowering; compilation; one second at 1 ms, with lowering",
-    "modes": "four states and a ring of modes; the same columns",
-    "seconds": "the driveline with its estimator at 1 kHz in compiled C, rows every 10 ms",
-    "variants": "variants of the tip-out over five parameters, in one call on one core, at 5 ms",
-    "workers": "20 000 variants of the driveline with its estimator, a study in a new folder, "
-    "elapsed time",
+    "states": "The automaton is a chain of inertias with two states each and three modes. *Read "
+    "and checked* is the time for reading, checking and lowering the spec. *Compiled* is the time of "
+    "the C compiler. *Run again* is the time of a simulation of one second with a major step of "
+    "1 ms, including the lowering.",
+    "modes": "The automaton has four states, and its modes form a ring. The columns have the same "
+    "meaning as in the table of states.",
+    "seconds": "The driveline and its estimator with a period of 1 ms run in compiled C. The run "
+    "records a row every 10 ms.",
+    "variants": "One call computes variants of the tip-out on one core. The variants differ in "
+    "five parameters, and the major step is 5 ms.",
+    "workers": "A study computes 20 000 variants of the driveline with its estimator in a new "
+    "folder. The table gives elapsed times.",
 }
 WHY = {
     "states": "The stability limit of the step needs the eigenvalues of each mode. They are "
-    "computed in the arithmetic of the language, with the same bits on every machine; the cost is "
-    "cubic and half of `run again` at 64 states. The compiled C has one line per operation.",
-    "modes": "Each mode has its own equations and its own step; no work depends on pairs of modes. "
-    "Below ten modes the start of the compiler dominates.",
-    "seconds": "Lowering and printing take a tenth of a second. The memory holds the plan of the "
-    "run (instants and their actions) and the rows.",
+    "computed in the arithmetic of the language, so that every machine computes the same bits. The "
+    "cost of the eigenvalues is cubic in the number of states. At 64 states it is half of the time "
+    "of *run again*. The compiled C has one line per operation.",
+    "modes": "Each mode has its own equations and its own step. No work depends on pairs of modes. "
+    "Below ten modes the start of the compiler takes most of the time.",
+    "seconds": "Lowering and printing take a tenth of a second. The memory holds the recorded rows "
+    "and the plan of the run, which lists instants and their actions.",
     "variants": "The time is linear from one hundred variants on. The memory holds the results of "
-    "the call; studies run in blocks with constant memory (docs/studies.md).",
-    "workers": "Each worker starts Python, loads the study and the compiled library before its "
-    "first block, which takes more than a second of processor time. More workers than cores add to "
-    "that.",
+    "the call. [Studies](studies.md) compute their variants in blocks, so that their memory is "
+    "constant.",
+    "workers": "Before its first block each worker starts Python and loads the study and the "
+    "compiled library. This takes more than a second of processor time per worker. With more "
+    "workers than cores the study takes longer.",
 }
 """Reasons for the measured exponents, found with a profiler; check them with new figures."""
 STUDY_VARIANTS = 20_000
@@ -228,22 +235,27 @@ def page(found: Mapping[str, Sequence[Point]]) -> str:
     lines = [
         "# Scaling",
         "",
-        '`make bench ARGS="--growth"` measures this page. Each point runs in a process of its own. '
-        "Times are processor times; those of workers are elapsed times.",
-        f"{os.cpu_count()} cores; other load on the machine changes the figures.",
+        'The command `make bench ARGS="--growth"` measures the figures on this page. Each row of a '
+        "table is measured in a process of its own. The times are processor times, except in the "
+        "table of workers.",
+        f"The machine has {os.cpu_count()} cores. Other load on the machine changes the figures.",
         "",
         "![Time and memory over the size](growth.png)",
     ]
     for name, points in found.items():
         parts = list(points[0].seconds)
-        lines += ["", f"**{name}**: {ABOUT[name]}.", ""]
+        lines += ["", f"**Number of {name}.** {ABOUT[name]}", ""]
         lines += [f"| {name} | " + " | ".join(f"{part} [s]" for part in parts) + " | memory [MB] |"]
         lines += ["|---" * (len(parts) + 2) + "|"]
         for one in points:
             cells = [f"{one.size:,}", *(f"{one.seconds[part]:.3g}" for part in parts)]
             lines += ["| " + " | ".join([*cells, f"{one.megabytes:.0f}"]) + " |"]
-        grows = [f"{part}: size^{exponent(points, part):.1f}" for part in parts]
-        lines += ["", f"Between the last two points: {', '.join(grows)}. {WHY[name]}"]
+        powers = [f"{exponent(points, part):.1f} (*{part}*)" for part in parts]
+        lines += [
+            "",
+            f"Between the last two rows the time grows with the number of {name} to the power of "
+            f"{', '.join(powers)}. {WHY[name]}",
+        ]
     return "\n".join(lines) + "\n"
 
 
