@@ -41,8 +41,8 @@ CURVES: Mapping[str, Sequence[int]] = {
 }
 ABOUT = {
     "states": "The automaton is a chain of inertias with two states each and three modes. *Read "
-    "and checked* is the time for reading, checking and lowering the spec. *Compiled* is the time of "
-    "the C compiler. *Run again* is the time of a simulation of one second with a major step of "
+    "and checked* is the time for reading, checking and lowering the spec. *Compiled* is the time "
+    "of the C compiler. *Run again* is the time of a simulation of one second with a major step of "
     "1 ms, including the lowering.",
     "modes": "The automaton has four states, and its modes form a ring. The columns have the same "
     "meaning as in the table of states.",
