@@ -23,7 +23,7 @@ from language.text.node_edit import format_inline
 SYSTEM_KEYS = tuple(
     "language system inputs instances sensors connections outputs".split()  # noqa: SIM905
 )
-SYSTEM_INPUT_KEYS = ("unit", "default", "range", "type", "values")
+SYSTEM_INPUT_KEYS = ("unit", "default", "type", "values")
 INSTANCE_KEYS = ("of", "values", "offset")
 
 Connections = Mapping[tuple[str, str], Connection]
