@@ -10,7 +10,6 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from language.expressions.syntax_tree import structural_key
 from language.ir.ops import (
     Assign,
     Binary,
@@ -183,10 +182,7 @@ def covariance_limit_blocks(
 
 def _limit_forms(observer: Observer) -> dict[str, object]:
     """Return the variance limits of an observer as comparable keys, by state."""
-    return {
-        n: (structural_key(low.tree), structural_key(high.tree))
-        for n, (low, high) in observer.variance_limits.items()
-    }
+    return {n: (low.tree, high.tree) for n, (low, high) in observer.variance_limits.items()}
 
 
 def variance_limits(

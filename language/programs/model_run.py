@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from language.expressions.syntax_tree import structural_key
 from language.integration.crossing_location import (
     RUN_BISECTIONS,
     continuous_step_blocks,
@@ -279,7 +278,7 @@ def _substep_without_events(
 
 def _settings_key(run: ModelRun) -> tuple[object, ...]:
     """Return the settings that all runs of an automaton must share, as a comparable key."""
-    at = {name: structural_key(formula.tree) for name, formula in (run.linearise or {}).items()}
+    at = {name: formula.tree for name, formula in (run.linearise or {}).items()}
     return run.method, run.substeps, run.linearise is None, at
 
 
