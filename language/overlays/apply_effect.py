@@ -243,7 +243,11 @@ class _EffectApplier:
         node, raw = body.get("redirect"), self.body.get("redirect")
         if not isinstance(node, MappingNode) or not isinstance(raw, MappingNode):
             return tree
-        excepted = tuple(self._fill_text(item.text) for item in scalars_of(raw.get("except")))
+        excepted = tuple(
+            path
+            for item in scalars_of(raw.get("except"))
+            for path in self._fill_key(item.text, ("redirect",))
+        )
         for entry in raw:
             if entry.key == "except" or not isinstance(entry.node, MappingNode):
                 continue

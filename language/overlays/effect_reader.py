@@ -341,7 +341,7 @@ def _parse_formula(path: KeyPath, scalar: ScalarNode, problems: Problems) -> tup
     Returns an empty tuple after a reported problem.
     """
     with problems.collect_errors():
-        if path[0] == "flow" or path[-2:-1] == ("flow",):
+        if path[0] != "redirect" and "flow" in (path[0], *path[-2:-1]):
             return parse_balance(scalar)
         return (parse_expression(scalar),)
     return ()
