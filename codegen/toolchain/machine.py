@@ -9,7 +9,13 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
-from codegen.toolchain.compiler import TIMEOUT, BuildError, find_compiler, run_executable
+from codegen.toolchain.compiler import (
+    TIMEOUT,
+    BuildError,
+    convert_process_errors,
+    find_compiler,
+    run_executable,
+)
 from codegen.toolchain.external_tools import ARM_COMPILER, EMULATOR, require_tool
 
 CORTEX_FLAGS = ("-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")
@@ -71,12 +77,10 @@ def run_in_qemu(target: Path, records: bytes, options: Sequence[str] = ()) -> by
         folder = Path(name)
         (folder / "records.in").write_bytes(records)
         command = [emulator, "-M", BOARD, *headless, *semihosting, *options, "-kernel", str(target)]
-        try:
+        with convert_process_errors("the emulated program"):
             done = subprocess.run(
                 command, cwd=folder, capture_output=True, timeout=TIMEOUT, stdin=subprocess.DEVNULL
             )
-        except subprocess.TimeoutExpired:
-            raise BuildError(f"the emulated program was not done after {TIMEOUT} s") from None
         if done.returncode != 0:
             reason = (
                 HARNESS_EXIT_CODES.get(done.returncode)
