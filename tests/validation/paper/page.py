@@ -18,7 +18,7 @@ from tests.validation.paper.pareto import Point
 FOLDER = ROOT / "docs" / "paper"
 PAGE = FOLDER / "README.md"
 JSON = ROOT / "build" / "paper.json"
-MARK = "Digest of `spec/paper/` and `spec/ev_driveline/`: `"
+MARK = "The digest of `spec/paper/` and `spec/ev_driveline/` is `"
 SPECS = ("spec/paper", "spec/ev_driveline")
 
 
