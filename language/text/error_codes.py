@@ -25,7 +25,7 @@ CODES: Mapping[str, tuple[str, str]] = {
     # Modes and transitions.
     "priority": (
         "MW201",
-        "Two guards of a mode can be true together, and their transitions have no priorities.",
+        "Two guards of a mode can be true together, and their transitions have equal priorities.",
     ),
     "refire": ("MW202", "Transitions fire again and again at the same instant."),
     "unreached": ("MW203", "No sequence of transitions enters a mode."),
