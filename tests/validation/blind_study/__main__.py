@@ -102,7 +102,8 @@ def _beside(every: Sequence[Answer], seed: int) -> list[str]:
     ):
         line = f"{words} names the right effect in {baseline_rate(full, method).text} cases."
         if clean:
-            line += f" Its rate of false alarms is {baseline_alarm_rate(clean, method).text}."
+            alarms = baseline_alarm_rate(clean, method).text
+            line += f" It gives a false alarm in {alarms} cases without an effect."
         lines.append(line)
     return [*lines, _compiled([*full, *clean])]
 
