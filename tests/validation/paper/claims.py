@@ -139,8 +139,8 @@ def _slow_estimator() -> Iterator[Claim]:
         "fig_8",
         "The filter matches the measured speeds well",
         f"The error is {speeds[0]:.1f} rpm for the motor speed and {speeds[1]:.2f} rpm for the "
-        "wheel speed. It is measured from the step on, in gaps and between the samples too. The "
-        f"error of the twist is {twist:.0f} mrad. While the scheme of Fig. 7 reports a gap, it has "
+        "wheel speed. The measurement begins at the step, and includes the gaps and the times "
+        f"between the samples. The error of the twist is {twist:.0f} mrad. While the scheme of Fig. 7 reports a gap, it has "
         "no estimate of the twist, and the picture shows 0",
         speeds[0] < 30.0 and speeds[1] < 1.0,
     )
