@@ -77,9 +77,9 @@ def _divergence(figure: str, found: Divergence) -> Claim:
         "frequencies differ",
         f"The model is fitted to the first {FITTED} s after the step (k_hs = {k_hs:.0f} N*m/rad, "
         f"c_hs = {c_hs:.1f} N*m*s/rad). In this time its motor speed has an error of {early:.1%} "
-        f"of the shuffle. The error is {middle:.0%} from then to 0.7 s, and {late:.0%} from 0.7 s "
-        f"to 1 s. In the first four cycles after 0.7 s the twist oscillates at {car:.2f} Hz in the "
-        f"vehicle and at {model:.2f} Hz in the model",
+        f"of the shuffle. Later the error is larger: {middle:.0%} until 0.7 s, and {late:.0%} from "
+        f"0.7 s to 1 s. In the first four cycles after 0.7 s the twist oscillates at {car:.2f} Hz "
+        f"in the vehicle and at {model:.2f} Hz in the model",
         early < 0.03 and late > 0.3,
         "The recordings of the paper are not published, so the vehicle here is a simulation. "
         "Beside its half-shaft acts a rubber element with a fifth of the shaft's stiffness, which "
@@ -140,8 +140,8 @@ def _slow_estimator() -> Iterator[Claim]:
         "The filter matches the measured speeds well",
         f"The error is {speeds[0]:.1f} rpm for the motor speed and {speeds[1]:.2f} rpm for the "
         "wheel speed. The measurement begins at the step, and includes the gaps and the times "
-        f"between the samples. The error of the twist is {twist:.0f} mrad. While the scheme of Fig. 7 reports a gap, it has "
-        "no estimate of the twist, and the picture shows 0",
+        f"between the samples. The error of the twist is {twist:.0f} mrad. While the scheme of "
+        "Fig. 7 reports a gap, it has no estimate of the twist, and the picture shows 0",
         speeds[0] < 30.0 and speeds[1] < 1.0,
     )
     share, held, rest = _torque_off("at_100Hz"), *_torque_at_100_hz()
