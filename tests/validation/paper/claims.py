@@ -148,9 +148,10 @@ def _slow_estimator() -> Iterator[Claim]:
     yield Claim(
         "fig_9",
         "In contact the torque generally matches its reference",
-        f"The error is {share:.0%} of the torque. Samples of the true torque, held for 10 ms each, "
-        f"would have an error of {held:.0%}. After the last gap the error of the estimator at the "
-        f"samples is {rest:.1%}, so most of its error arises in the gaps",
+        f"The error is {share:.0%} of the root mean square of the torque. Samples of the true "
+        f"torque, held for 10 ms each, would have an error of {held:.0%}. After the last gap the "
+        f"error of the estimator at the samples is {rest:.1%}, so most of its error arises in the "
+        "gaps",
         rest < 0.02,
     )
     left = landing_lead_time("at_100Hz")
@@ -169,8 +170,8 @@ def _fast_estimator() -> Iterator[Claim]:
     yield Claim(
         "fig_11",
         "At 1 kHz the estimates match the simulation",
-        f"The error of the torque is {share:.1%} of the torque. While the plant is in a gap, the "
-        f"error of the position in the gap is {place:.2f} mrad. The gap is 51 mrad wide",
+        f"The error of the torque is {share:.1%} of its root mean square. While the plant is in a "
+        f"gap, the error of the position in the gap is {place:.2f} mrad. The gap is 51 mrad wide",
         share < 0.05 and place < 2.0,
     )
     found = run_scenario("paper_tip_out")
@@ -190,8 +191,8 @@ def _three_rates() -> Iterator[Claim]:
     yield Claim(
         "fig_13",
         "A delay is visible at 100 Hz. The outputs at 1 kHz and 10 kHz are close to the reference",
-        f"The error of the torque is {shown[0]} of the torque at 100 Hz, {shown[1]} at 1 kHz and "
-        f"{shown[2]} at 10 kHz",
+        f"The error of the torque is {shown[0]} of its root mean square at 100 Hz, {shown[1]} at "
+        f"1 kHz and {shown[2]} at 10 kHz",
         errors[0] > 5.0 * errors[1] and max(errors[1:]) < 0.05,
     )
     late = table_1()
