@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from expectation.expectations import ModePredicate, RegionRef
+from language.ir.analysis_cache import cache_on_owner
 from language.ir.regions import CHART
 from language.loading.event_names import ModeEntryEvent
 from language.loading.load import lower_automaton
-from language.model.analysis_cache import cache_on_owner
 from language.model.automaton import Automaton
 from language.model.system import System
 from language.text.diagnostic import Problems, Span, suggest_name

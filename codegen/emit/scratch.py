@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 from codegen.passes.block_usage import Usage
 from codegen.passes.definite_assignment import find_unassigned_reads
-from language.ir.ops import Loop, RunBlock
+from language.ir.ops import Loop
 from language.ir.program import Program, Variable
-from language.ir.traversal import names_used, reachable_blocks, walk_ops
+from language.ir.traversal import called_blocks, names_used, reachable_blocks, walk_ops
 
 STEP = "step"
 """The block that executes one step."""
@@ -85,8 +85,9 @@ def _innermost_block(
         is_plain = not shared & names_used([block]) and not any(
             isinstance(op, Loop) for op in walk_ops(block)
         )
-        runs = [op.block for op in walk_ops(block) if isinstance(op, RunBlock)]
-        callers = [called for called in runs if "work" in usage_by_block[called].needs]
+        callers = [
+            called for called in called_blocks(block) if "work" in usage_by_block[called].needs
+        ]
         if not is_plain or len(callers) != 1:
             return name
         name = callers[0]

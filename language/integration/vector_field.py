@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from language.expressions.units import rate_dimension
+from language.ir.analysis_cache import cache_on_owner
 from language.ir.ops import (
     Assign,
     Binary,
@@ -46,7 +47,6 @@ from language.lowering.expressions import (
 )
 from language.lowering.guard_slots import all_guard_slots, guard_slot, guard_slots, mode_bindings
 from language.lowering.program_builder import equation_variables
-from language.model.analysis_cache import cache_on_owner
 from language.model.automaton import Automaton, Balance, Mode, Transition
 from language.model.declaration import Formula
 from language.model.region_queries import (

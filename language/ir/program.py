@@ -24,6 +24,8 @@ from language.ir.number_type import NumberType
 from language.ir.ops import Block
 from language.ir.regions import CHART
 
+ENTRY_BLOCKS = ("init", "derive", "step")
+"""The blocks at which generated C enters a Program."""
 MODE_VARIABLE = "memory.mode"
 """Variable of the chart's mode; a run of a model has its own."""
 LOG_VARIABLE = "memory.log"

@@ -20,6 +20,7 @@ from language.expressions.syntax_tree import (
     memory_key,
     walk,
 )
+from language.ir.analysis_cache import cache_on_owner
 from language.ir.ops import (
     Assign,
     Block,
@@ -39,7 +40,6 @@ from language.ir.ops import (
 from language.ir.program import ValueType, Variable
 from language.lowering.constants import evaluate_exactly
 from language.lowering.expressions import NameBindings, lower_expression
-from language.model.analysis_cache import cache_on_owner
 from language.model.automaton import Automaton, Mode
 from language.model.declaration import Formula
 from language.model.truth_table import truth_table_formulas

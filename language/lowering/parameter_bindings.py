@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from language.expressions.units import Unit
+from language.ir.analysis_cache import cache_on_owner
 from language.ir.number_type import round_to_type
 from language.ir.ops import Expr, Ref, Value
 from language.ir.program import TICK_UNIT, Constant, value_type
 from language.lowering.expressions import WHOLE_TYPES, names_read
 from language.lowering.wait_ticks import tunable_waits, wait_range_in_ticks
-from language.model.analysis_cache import cache_on_owner
 from language.model.automaton import Automaton
 from language.model.declaration import Formula
 from language.model.graphs import post_order

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from itertools import accumulate
 
+from language.ir.analysis_cache import cache_on_owner
 from language.ir.ops import (
     Assign,
     Expr,
@@ -19,7 +20,6 @@ from language.lowering.constants import evaluate_exactly
 from language.lowering.guard_slots import guard_slot
 from language.lowering.tick_history import rollbacks_of
 from language.lowering.wait_ticks import MAX_WAIT_TICKS, seconds_to_ticks, tunable_wait
-from language.model.analysis_cache import cache_on_owner
 from language.model.automaton import Automaton, Mode, Transition
 from language.text.diagnostic import Problems
 
@@ -32,7 +32,7 @@ def transition_infos(automaton: Automaton, problems: Problems) -> tuple[Transiti
     not constant is reported.
     """
     found: list[TransitionInfo] = []
-    back = {id(rollback.transition): rollback.max_ticks for rollback in rollbacks_of(automaton)}
+    back = {rollback.transition.key: rollback.max_ticks for rollback in rollbacks_of(automaton)}
     for mode in automaton.all_modes:
         for k, transition in enumerate(mode.transitions):
             wait = Fraction(0)
@@ -60,7 +60,7 @@ def transition_infos(automaton: Automaton, problems: Problems) -> tuple[Transiti
                     key=f"{automaton.name} {transition.key}",
                     region=mode.region,
                     slot=guard_slot(mode.region, k),
-                    rewind_ticks=back.get(id(transition), 0),
+                    rewind_ticks=back.get(transition.key, 0),
                     chart_endpoints=_chart_endpoints(automaton, transition),
                     tunable_wait=f"calibration.{tunable}" if tunable else None,
                 )

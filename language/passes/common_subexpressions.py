@@ -14,10 +14,10 @@ from collections import Counter
 from collections.abc import Mapping
 
 from language.ir.formula_name import format_formula, formula_name
-from language.ir.ops import Assign, Binary, Block, Call, Expr, Op, Ref, RunBlock, Store
+from language.ir.ops import Assign, Binary, Block, Call, Expr, Op, Ref, Store
 from language.ir.program import Program, Variable
 from language.ir.rewrite_ops import direct_expressions, map_expressions, map_operands, operands
-from language.ir.traversal import block_writes, walk_ops
+from language.ir.traversal import block_writes, called_blocks, reachable_blocks
 from language.lowering.expressions import is_whole
 from language.passes.value_numbering import ValueNumbering
 
@@ -87,9 +87,8 @@ class _BlockRewriter:
     def _invalidate_written(self, op: Op) -> None:
         """Start a new version of each variable that an operation writes, directly or by a block."""
         self.values.versions.update(set(block_writes((op,))))
-        for inner in walk_ops((op,)):
-            if isinstance(inner, RunBlock):
-                self.values.versions.update(self.writes[inner.block])
+        for called in called_blocks((op,)):
+            self.values.versions.update(self.writes[called])
 
     def _count_uses(self, expr: Expr) -> None:
         """Count the values of an expression; the parts of a repeated value are skipped."""
@@ -147,19 +146,11 @@ def _all_names(program: Program) -> list[str]:
 
 def _transitive_writes(program: Program) -> dict[str, frozenset[str]]:
     """Return the variables that each block writes, directly or through the blocks that it runs."""
-    found: dict[str, frozenset[str]] = {}
-
-    def visit(name: str) -> frozenset[str]:
-        """Return the variables that a block writes, and store them in `found`."""
-        if name not in found:
-            block = program.blocks[name]
-            own = set(block_writes(block))
-            for op in walk_ops(block):
-                if isinstance(op, RunBlock):
-                    own |= visit(op.block)
-            found[name] = frozenset(own)
-        return found[name]
-
-    for name in program.blocks:
-        visit(name)
-    return found
+    return {
+        name: frozenset(
+            variable
+            for run in reachable_blocks(name, program.blocks)
+            for variable in block_writes(program.blocks[run])
+        )
+        for name in program.blocks
+    }

@@ -38,7 +38,14 @@ from language.integration.vector_field import (
     lower_single_region_step,
 )
 from language.ir.ops import Assign, Binary, Block, Expr, Ref, RunBlock, add, integer, multiply
-from language.ir.program import Program, StabilityLimit, TransitionInfo, Variable, fired_variable
+from language.ir.program import (
+    ENTRY_BLOCKS,
+    Program,
+    StabilityLimit,
+    TransitionInfo,
+    Variable,
+    fired_variable,
+)
 from language.lowering.action_stages import discrete_variables
 from language.lowering.constants import constant_values, parameter_constants
 from language.lowering.continuous_delay import (
@@ -87,7 +94,6 @@ from language.programs.parallel_regions import (
 )
 from language.text.diagnostic import Problems
 
-ENTRY_BLOCKS = ("init", "derive", "step")
 ENGINE_BLOCKS = (
     "latch",
     "start",

@@ -38,9 +38,9 @@ class Reader:
     """Reads parts of a document and reports problems into one collector."""
 
     def __init__(self, problems: Problems) -> None:
-        """Report into `problems`; expressions are cached by scalar object and key path."""
+        """Report into `problems`; expressions are cached by scalar and key path."""
         self.problems = problems
-        self.parsed_formulas: dict[tuple[int, str], tuple[ScalarNode, Formula]] = {}
+        self.parsed_formulas: dict[tuple[ScalarNode, str], Formula] = {}
 
     def read_mapping(
         self, node: YamlNode | None, what: str, known_keys: Iterable[str] | None = None
@@ -219,15 +219,15 @@ class Reader:
         """Return an expression with its key path; None (reported) if it is absent or no scalar.
 
         A text that does not parse is reported and gives an `ErrorNode`. Results are cached by
-        scalar object and key, so that a section of the root that is read for each mode reports
+        scalar and key, so that a section of the root that is read for each mode reports
         once.
         """
         scalar = self.read_scalar(node, key.rpartition(".")[2], span)
         if scalar is None:
             return None
-        if (id(scalar), key) not in self.parsed_formulas:
-            self.parsed_formulas[id(scalar), key] = scalar, self._parse_formula(scalar, key)
-        return self.parsed_formulas[id(scalar), key][1]
+        if (scalar, key) not in self.parsed_formulas:
+            self.parsed_formulas[scalar, key] = self._parse_formula(scalar, key)
+        return self.parsed_formulas[scalar, key]
 
     def _parse_formula(self, scalar: ScalarNode, key: str) -> Formula:
         """Return the parsed expression of a scalar; an `ErrorNode` with a problem reported."""

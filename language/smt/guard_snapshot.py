@@ -22,6 +22,7 @@ from language.expressions.syntax_tree import (
     memory_key,
     walk,
 )
+from language.ir.analysis_cache import cache_on_owner
 from language.ir.number_type import round_to_type
 from language.ir.ops import Binary, Compare, Expr, Ref, Select, Unary, Value, integer
 from language.ir.program import mode_variable
@@ -31,7 +32,6 @@ from language.lowering.constants import evaluate_exactly
 from language.lowering.delay_buffers import evaluate_ticks, expression_type
 from language.lowering.expressions import WHOLE_TYPES, lower_assigned_value, lower_expression
 from language.lowering.parameter_bindings import constant_bindings
-from language.model.analysis_cache import cache_on_owner
 from language.model.automaton import Automaton, Mode, Transition
 from language.model.chart_paths import mode_paths
 from language.model.declaration import Formula
