@@ -17,7 +17,7 @@ from expectation.expectations import Test
 from expectation.instrumentation import GUARD_READ_BLOCK, instrument, reached_array
 from expectation.mcdc import COVERED, ConditionCoverage, Decision, decision_of
 from language.ir.program import Program
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 from language.loading.load import lower_automaton
 from language.model.automaton import Automaton
 from language.passes.constant_folding import run_passes

@@ -27,7 +27,7 @@ from codegen.emit.c_names import (
 from codegen.emit.c_statement import INDENT, MAX_LINE_WIDTH, StatementEmitter
 from codegen.emit.c_struct import ECU_PAGE, HOST_PAGE, PageLayout, member_of, struct_members
 from codegen.emit.function_comments import describe_function
-from codegen.emit.scratch import STEP, Scratch, adjust_usages, scratch_of
+from codegen.emit.work_variables import STEP, Scratch, adjust_usages, scratch_of
 from codegen.passes.block_usage import Usage, block_usages, locals_of, loop_locals
 from codegen.passes.dead_stores import remove_dead_stores
 from codegen.passes.fast_path import EVENT_PATH, FastPathMode, add_fast_path
@@ -42,7 +42,7 @@ from language.lowering.calibration_stamp import STALE_CALIBRATION
 from language.lowering.invariants import INVARIANT_PREFIX, INVARIANTS
 from language.lowering.program_builder import finalise_program
 from language.model.declaration import MICRO_STEP_LIMIT_FAULT
-from language.model.graphs import post_order
+from language.model.graph_algorithms import post_order
 from language.numerics.function_table import FUNCTIONS_BY_TYPE
 from language.observers.covariance_update import COVARIANCE_RANGE
 from language.programs.major_step import LIVELOCK, ZENO

@@ -19,7 +19,7 @@ from language.ir.traversal import (
     reachable_blocks,
     walk_ops,
 )
-from language.model.graphs import post_order
+from language.model.graph_algorithms import post_order
 from language.programs.major_step import STEP_INTERFACE
 
 POINTER_OF_GROUP = {

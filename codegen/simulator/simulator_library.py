@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from codegen.simulator.signal_names import column_positions, row_width
-from codegen.simulator.simd_variants import LANES
+from codegen.simulator.simd_batch import LANES
 from codegen.simulator.simulator_source import emit_simulator_files
 from codegen.toolchain.build_cache import cache_folder, get_or_build, key_of
 from codegen.toolchain.compiler import (
@@ -25,7 +25,7 @@ from codegen.toolchain.compiler import (
     run_compilers,
 )
 from codegen.toolchain.object_cache import is_shared, object_of
-from language.programs.simulation_assembly import SimulationAssembly
+from language.programs.system_program import SimulationAssembly
 
 Pointer = ctypes.c_void_p
 Int64 = ctypes.c_int64

@@ -29,7 +29,7 @@ from codegen.simulator.signal_names import (
     emit_wire_formula,
     row_width,
 )
-from codegen.simulator.simd_variants import LANES
+from codegen.simulator.simd_batch import LANES
 from codegen.toolchain.templates import product_version, render
 from language.ir.number_type import NumberType
 from language.ir.program import Program, unqualified_name
@@ -38,7 +38,7 @@ from language.lowering.program_builder import finalise_program
 from language.model.system import Sensor
 from language.programs.continuous_program import ENGINE_BLOCKS
 from language.programs.major_step import STEP_INTERFACE
-from language.programs.simulation_assembly import (
+from language.programs.system_program import (
     InputSource,
     InputTrajectory,
     SimulationAssembly,

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from diagnosis.data.noise_estimate import noise_of
 from engine.recordings.recording import Channel, Recording, split_by_windows
 from language.model.automaton import Automaton
-from language.model.graphs import reachable
+from language.model.graph_algorithms import reachable
 from language.model.system import RecordingMap
 
 Reals = NDArray[np.float64]

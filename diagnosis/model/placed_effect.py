@@ -24,7 +24,7 @@ from language.overlays.apply_effect import apply_effect
 from language.overlays.effect_place import PlaceMismatch, find_effect_place
 from language.overlays.effect_reader import Effect, EffectApplication, added_names, read_effect
 from language.overlays.expand_document import Project, read_document
-from language.overlays.tree_types import formula_entries
+from language.overlays.name_types import formula_entries
 from language.programs.continuous_program import stable_step_limits
 from language.text.diagnostic import Problems, Source, Span
 from language.text.document import Document, MappingNode, ScalarNode

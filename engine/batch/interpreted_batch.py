@@ -21,7 +21,7 @@ from engine.batch.batch import (
 from engine.batch.parameter_binding import ParameterBinding, group_variants
 from engine.interpreter.apply_calibration import DERIVE_BLOCKS
 from engine.interpreter.interpreter import Interpreter, Stepper
-from engine.results.samples import Event
+from engine.results.sampled_run import Event
 from engine.results.trajectory import Trajectory
 from engine.simulation.event_schedule import TimeGrid
 from engine.simulation.simulate import BuildStepper, simulate

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 
 from language.expressions.syntax_tree import Not, Relation, SyntaxTree
 from language.model.automaton import Automaton, Mode, Transition
-from language.smt.guard_snapshot import GuardSnapshot
 from language.smt.query import SolverQuery
 from language.smt.query_engine import QueryEngine, Witness
+from language.smt.symbolic_environment import GuardSnapshot
 from language.text.diagnostic import Problems, SpecError
 
 EXCLUSIVE_RELATIONS = {"<": (">", ">="), "<=": (">",), ">": ("<", "<="), ">=": ("<",)}

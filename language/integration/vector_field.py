@@ -35,7 +35,7 @@ from language.lowering.action_stages import (
     read_stage,
     storage_of,
 )
-from language.lowering.continuous_edges import level_change_conditions, set_levels
+from language.lowering.continuous_edge_detection import level_change_conditions, set_levels
 from language.lowering.expressions import (
     NameBindings,
     choose_by_mode,

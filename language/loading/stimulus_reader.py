@@ -24,12 +24,12 @@ from language.expressions.syntax_tree import (
 from language.expressions.units import NO_UNIT, SECOND, Unit, are_compatible, parse_unit
 from language.model.declaration import Formula
 from language.model.system import Stimulus, StimulusPiece, SystemInput
-from language.reading.difference_literal import read_difference
-from language.reading.reader import Reader
+from language.readers.base_reader import Reader
+from language.readers.difference_literal import read_difference
 from language.text.diagnostic import Span
 from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
-from language.typecheck.environment import NameEnvironment
 from language.typecheck.infer import TypeChecker
+from language.typecheck.name_environment import NameEnvironment
 
 FORMS = ("steps", "ramp", "chirp", "table", "pulses")
 """Keys that give an input as a function of time; at most one is allowed."""

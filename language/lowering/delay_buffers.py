@@ -44,8 +44,8 @@ from language.model.automaton import Automaton, Mode
 from language.model.declaration import Formula
 from language.model.truth_table import truth_table_formulas
 from language.text.diagnostic import Problems
-from language.typecheck.environment import NameEnvironment
 from language.typecheck.infer import TypeChecker
+from language.typecheck.name_environment import NameEnvironment
 from language.typecheck.types import EnumType, IntType
 
 MAX_DELAY = 4096

@@ -25,16 +25,16 @@ from language.ir.program import (
     mode_variable,
     value_type,
 )
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 from language.ir.round_literals import round_program
 from language.ir.traversal import block_names, names_used, reachable_blocks
 from language.lowering.expressions import WHOLE_TYPES, lower_assigned_value
 from language.lowering.invariants import invariant_infos
-from language.lowering.parameter_bindings import cast_to_type
+from language.lowering.program_parameters import cast_to_type
 from language.lowering.range_saturation import store_initial_value
 from language.model.automaton import Automaton, Region
 from language.model.declaration import State
-from language.model.graphs import post_order
+from language.model.graph_algorithms import post_order
 from language.model.statechart import Chart
 from language.numerics.function_table import FUNCTIONS_BY_TYPE
 from language.typecheck.types import EnumType, IntType

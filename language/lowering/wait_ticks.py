@@ -15,7 +15,7 @@ from language.ir.analysis_cache import cache_on_owner
 from language.ir.program import MAX_TIMER_TICKS
 from language.model.automaton import Automaton, Transition
 from language.model.declaration import Formula, Parameter, Range
-from language.model.names_read import names_read_by
+from language.model.used_names import names_read_by
 from language.text.diagnostic import Problems
 
 MAX_WAIT_TICKS = MAX_TIMER_TICKS - 1

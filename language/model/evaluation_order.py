@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence, Set
 from language.expressions.syntax_tree import SyntaxTree, names
 from language.ir.analysis_cache import cache_on_owner
 from language.model.automaton import Mode
-from language.model.graphs import (
+from language.model.graph_algorithms import (
     find_cycle,
     format_cycle,
     reachable,

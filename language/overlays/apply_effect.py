@@ -23,11 +23,11 @@ from language.overlays.effect_edits import (
 )
 from language.overlays.effect_place import EffectPlace, Hole, PlaceMismatch, find_effect_place
 from language.overlays.effect_reader import ADDED_SECTIONS, EffectApplication, added_names
+from language.overlays.name_types import formula_entries
 from language.overlays.parameter_override import set_parameter_value
-from language.overlays.tree_types import formula_entries
 from language.text.diagnostic import Problems, Source, Span, suggest_name
 from language.text.document import Entry, MappingNode, ScalarNode, SequenceNode, YamlNode
-from language.text.formula_sites import EFFECT_SITES, KeyPath, map_formulas
+from language.text.expression_paths import EFFECT_SITES, KeyPath, map_formulas
 from language.text.node_edit import find_node, mapping_entries, put_node, replace_source, scalars_of
 from language.text.overlay import apply_overlay
 

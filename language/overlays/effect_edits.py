@@ -13,11 +13,11 @@ from language.expressions.text_rewrite import (
     split_summands,
     substitute_reads,
 )
-from language.overlays.tree_types import formula_entries
-from language.reading.element_reader import outputs_as_mapping
+from language.overlays.name_types import formula_entries
+from language.readers.element_reader import outputs_as_mapping
 from language.text.diagnostic import Span
 from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
-from language.text.formula_sites import AUTOMATON_SITES, KeyPath, map_formulas
+from language.text.expression_paths import AUTOMATON_SITES, KeyPath, map_formulas
 from language.text.node_edit import find_node, mapping_entries, put_node
 
 MODE_CONTAINERS = frozenset({"modes", "regions", "templates", "transition_table"})

@@ -45,7 +45,7 @@ def generate(
     modewright generate --all --out build
     """
     from modewright.api import code_generation as code
-    from modewright.api.stale_generated import generated_files
+    from modewright.api.stale_generated_code import generated_files
 
     if every == (automaton is not None):
         raise typer.BadParameter("name an automaton or use --all", param_hint="AUTOMATON")
@@ -76,7 +76,7 @@ def generate(
 
 def _exit_if_stale(out: Path) -> None:
     """Print the stale files below the folder `out` and exit with code 1 if there are any."""
-    from modewright.api.stale_generated import stale_files
+    from modewright.api.stale_generated_code import stale_files
 
     lines = stale_files(Path(), out)
     for line in lines:

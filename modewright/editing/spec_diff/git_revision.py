@@ -14,7 +14,7 @@ from pathlib import Path
 
 from codegen.toolchain.external_tools import require_tool
 from language.overlays.expand_document import expand_document
-from language.reading.reader import NO_SPAN
+from language.readers.base_reader import NO_SPAN
 from language.text.diagnostic import Problems, Source, Span, SpecError
 from language.text.document import Document, Entry, MappingNode, ScalarNode, SequenceNode, YamlNode
 from language.text.node_edit import put_node

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import modewright as mw
-from tests.language.build import problem_lines, project_of
+from tests.language.spec_builders import problem_lines, project_of
 
 CART = """language: 1
 automaton: cart

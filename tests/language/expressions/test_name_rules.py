@@ -13,7 +13,7 @@ from language.expressions.name_rules import (
 )
 from language.text.diagnostic import Problems
 from language.typecheck.function_calls import FUNCTION_NAMES
-from tests.language.build import NOWHERE
+from tests.language.spec_builders import NOWHERE
 
 
 def complaints(name: str) -> list[str]:

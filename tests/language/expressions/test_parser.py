@@ -29,7 +29,7 @@ from language.expressions.units import NO_UNIT, parse_unit
 from language.text.diagnostic import Source
 from language.text.document import ScalarNode
 from language.text.yaml_parser import parse_yaml
-from tests.language.build import NOWHERE, raised_problems, scalar, tree
+from tests.language.spec_builders import NOWHERE, raised_problems, scalar, tree
 
 SUM, PRODUCT, SIGN, POWER, ATOM = 5, 6, 7, 8, 9
 UNITS = ("m", "1/s", "N*m", "rad/s", "m^2", "N*m*s/rad", "deg", "m^-1", "1/s^2")

@@ -15,7 +15,7 @@ from language.expressions.text_rewrite import (
     split_summands,
     substitute_reads,
 )
-from tests.language.build import scalar
+from tests.language.spec_builders import scalar
 
 leaves = st.sampled_from(["a", "b", "ab", "m", "x_1", "2", "0.5", "3 m", "2.0e-3 N*m", "5 1/s"])
 expressions = st.recursive(

@@ -14,7 +14,7 @@ from language.loading.scenario_reader import MAX_HORIZON, read_scenario
 from language.loading.system_reader import read_system
 from language.model.system import Scenario, System
 from language.overlays.expand_document import read_document
-from tests.language.build import (
+from tests.language.spec_builders import (
     SHIPPED,
     dimension,
     document,

@@ -12,7 +12,7 @@ from hypothesis import given, settings, strategies as st
 from language.loading.system_reader import read_system
 from language.model.system import System
 from language.text.document import ScalarNode
-from tests.language.build import document, problem_lines, project_of, raised_problems
+from tests.language.spec_builders import document, problem_lines, project_of, raised_problems
 
 PLANT = """language: 1
 automaton: plant

@@ -8,10 +8,10 @@ import pytest
 
 from language.loading.load import load_automaton, program_of
 from language.overlays.expand_document import Project, expand_document, read_document
-from language.reading.element_reader import outputs_as_mapping
+from language.readers.element_reader import outputs_as_mapping
 from language.text.document import ScalarNode
 from language.text.node_edit import find_node
-from tests.language.build import problem_lines, project_of
+from tests.language.spec_builders import problem_lines, project_of
 
 CART = """language: 1
 automaton: cart

@@ -14,7 +14,7 @@ from language.text.diagnostic import Problem, Problems, Source
 from language.text.document import MappingNode, ScalarNode, SequenceNode, YamlNode
 from language.text.overlay import apply_overlay, without_keys
 from language.text.yaml_parser import parse_yaml
-from tests.language.build import automaton, problem_lines, project_of, raised_problems, tree
+from tests.language.spec_builders import automaton, problem_lines, project_of, raised_problems, tree
 
 Plain = str | list[str] | dict[str, "Plain"]
 

@@ -13,7 +13,7 @@ from language.lowering.expressions import lower_expression
 from language.numerics.evaluate import evaluate
 from language.typecheck.interval import UNBOUNDED, Interval
 from language.typecheck.range_analysis import RangeAnalysis
-from tests.language.build import tree
+from tests.language.spec_builders import tree
 
 RANGES = {"a": Interval(-2.0, 3.0, True), "b": Interval(0.5, 4.0, True)}
 TEXTS = [

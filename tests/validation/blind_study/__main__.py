@@ -10,21 +10,21 @@ from collections.abc import Sequence
 from functools import partial
 from statistics import median
 
-from tests.validation.blind_study.acceptance import Bar, bars
-from tests.validation.blind_study.answer import Answer
+from tests.validation.blind_study.acceptance_criteria import Bar, bars
+from tests.validation.blind_study.case_score import Answer
 from tests.validation.blind_study.cases import GENERATOR
-from tests.validation.blind_study.catalogue import pairs_of
-from tests.validation.blind_study.control import (
+from tests.validation.blind_study.effect_catalogue import pairs_of
+from tests.validation.blind_study.label_digests import is_sealed, seals_of, write_seals
+from tests.validation.blind_study.negative_control import (
     baseline_alarm_rate,
     baseline_rate,
     majority_rate,
     permutation_score,
 )
-from tests.validation.blind_study.page import write_page
 from tests.validation.blind_study.plan import SEED, Plan, plans
+from tests.validation.blind_study.proof_page import write_page
 from tests.validation.blind_study.results_store import dask, diagnose_cases, export_study, threads
-from tests.validation.blind_study.seals import is_sealed, seals_of, write_seals
-from tests.validation.figures.store import ROOT
+from tests.validation.evidence.evidence_store import ROOT
 
 VERDICTS = ROOT / "docs" / "evidence" / "proof.parquet"
 ASKED = 0.1

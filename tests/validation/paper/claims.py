@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tests.validation.paper.divergence import FITTED, Divergence, fit_divergence
+from tests.validation.paper.frequency_divergence import FITTED, Divergence, fit_divergence
 from tests.validation.paper.manoeuvre import (
     STEP,
     cycles,
