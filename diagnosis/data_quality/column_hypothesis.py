@@ -104,18 +104,19 @@ def find_clock_and_sign_errors(
     """Return findings on wrong clocks and signs, or None if the model cannot be used.
 
     The findings are errors of kind `sign` or `clock_offset`, those of `find_column_errors`. A
-    window with fewer than two common samples, or without a value of an input, is left out. None is
-    returned if no window remains, if the model does not compile or no C compiler works, if the
-    recordings have different rates, or if the model cannot be linearised.
+    window with too few samples (`sample_windows`, `decimate`), or without a value of an input, is
+    left out. None is returned if no window remains, if the model does not compile or no C compiler
+    works, if the recordings have different rates, or if the model cannot be linearised.
     """
     seen = compared_outputs(mapping, automaton)
     series: list[SampledRecording] = []
     for piece in (piece for recording in recordings for piece in split_by_windows(recording)):
         with suppress(ValueError, KeyError):
-            series += sample_windows(piece, mapping, automaton, seen)
+            series += resample(
+                sample_windows(piece, mapping, automaton, seen), automaton, seen, False
+            )
     if not series:
         return None
-    series = list(resample(series, automaton, seen, False))
     drifts = balance_disturbances(document, automaton)
     model_set = ModelSet(document, project, automaton, (), tuple(series), seen, drifts)
     try:
