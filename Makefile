@@ -28,8 +28,8 @@ help: ## list the targets
 setup: $(STAMP) ## build .venv with everything, this project included
 	@:
 
-$(STAMP): pyproject.toml uv.lock tools/set_up.py
-	@$(find_python); exec $$python tools/set_up.py
+$(STAMP): pyproject.toml uv.lock tools/create_venv.py
+	@$(find_python); exec $$python tools/create_venv.py
 
 # A compiler for the target and its C library, its emulator, a second one and what counts with it,
 # rules of MISRA C, value analysis, what builds an FMU from its sources.
@@ -66,14 +66,14 @@ target-test: setup ## compare the C on an emulated Cortex-M4F with the engine, a
 	$(BIN)/pytest -n 2 --dist worksteal -q tests/codegen/target $(ARGS)
 
 prove: setup ## check the C of every sampled automaton by compilers, cppcheck and Frama-C
-	$(BIN)/python tests/validation/figures/proofs.py
+	$(BIN)/python tests/validation/evidence/proofs.py
 
 verify: setup ## measure every figure of docs/evidence; with recordings: ARGS="--recordings DIR"
-	$(BIN)/python tests/validation/figures/every.py $(ARGS)
+	$(BIN)/python tests/validation/evidence/run_all.py $(ARGS)
 
 verify-part: setup ## measure a fixed part of the figures, as CI does
-	$(BIN)/python tests/validation/figures/every.py --part
-	$(BIN)/python -m tests.validation.blind_study.part
+	$(BIN)/python tests/validation/evidence/run_all.py --part
+	$(BIN)/python -m tests.validation.blind_study.regression_cases
 
 prove-diagnosis: setup ## diagnose the sealed cases blind, write docs/proof.md (hours; resumable)
 	$(BIN)/python -m tests.validation.blind_study $(ARGS)
@@ -82,7 +82,7 @@ paper: setup ## reproduce the reference paper from specs: docs/paper, build/pape
 	$(BIN)/python -m tests.validation.paper $(ARGS)
 
 bench: setup ## measure speed against rivals; with ARGS="--peers diffrax,pathsim" those too
-	$(BIN)/python tests/benchmark/run.py $(ARGS)
+	$(BIN)/python tests/benchmark/run_benchmark.py $(ARGS)
 
 check: check-lock check-format check-lint check-types ## run all checks
 check: check-floors check-specs check-tests check-generated
@@ -124,7 +124,7 @@ generate: setup ## write the generated C and the JSON Schema anew
 	@$(find_python); exec $$python tools/fetch_uv.py $@
 
 lock: .tools/uv ## pin the dependencies anew (ARGS=--upgrade for newer ones)
-	@$(find_python); settings=$$($$python tools/index_settings.py) || exit; eval "$$settings"; \
+	@$(find_python); settings=$$($$python tools/package_index_settings.py) || exit; eval "$$settings"; \
 	$(UV_LOCK) --python $$python $(ARGS)
 
 clean: ## remove .venv, fetched tools, caches and build products

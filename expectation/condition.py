@@ -18,7 +18,7 @@ from expectation.expectations import (
     RegionRef,
     RunningStatistic,
 )
-from expectation.mode_names import (
+from expectation.name_resolution import (
     fault_bits,
     fault_words,
     format_region,
@@ -45,9 +45,9 @@ from language.model.declaration import Formula
 from language.model.system import System
 from language.text.diagnostic import Problems, Span, suggest_name
 from language.text.document import ScalarNode
-from language.typecheck.environment import NameEnvironment
 from language.typecheck.function_calls import alternatives_hint
 from language.typecheck.infer import TypeChecker
+from language.typecheck.name_environment import NameEnvironment
 from language.typecheck.types import EnumType, ExprType, IntType
 
 RUNNING_FUNCTIONS = ("count", "first", "rms")

@@ -17,7 +17,7 @@ from expectation.expectations import Test
 from expectation.instrumentation import GUARD_READ_BLOCK, instrument, reached_array
 from expectation.mcdc import COVERED, ConditionCoverage, Decision, decision_of
 from language.ir.program import Program
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 from language.loading.load import lower_automaton
 from language.model.automaton import Automaton
 from language.passes.constant_folding import run_passes
@@ -115,15 +115,17 @@ def measure_coverage(test: Test) -> list[Coverage]:
     """
     scenario = resolve_recording(test.system, test.scenario)
     decisions, programs, arrays = instrument_programs(automata_of(test.system, scenario))
-    steppers: dict[int, _CoverageInterpreter] = {}
+    steppers: list[_CoverageInterpreter] = []
 
     def build(program: Program) -> _CoverageInterpreter:
-        return steppers.setdefault(id(program), _CoverageInterpreter(program))
+        steppers.append(_CoverageInterpreter(program))
+        return steppers[-1]
 
     simulate(test.system, scenario, build, programs=programs)
     made = []
     for name, program in programs.items():
-        stepper, automaton = steppers[id(program)], test.system.instances[name].automaton
+        stepper = next(each for each in steppers if each.program is program)
+        automaton = test.system.instances[name].automaton
         seen = {
             key: frozenset(k for k, was in enumerate(stepper.get(array)) if was)
             for key, array in arrays[name].items()

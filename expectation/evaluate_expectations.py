@@ -17,7 +17,7 @@ from expectation.observed_run import (
     point_at_or_before,
     time_tolerance,
 )
-from language.loading.event_names import ModeEntryEvent
+from language.loading.mode_entry_event import ModeEntryEvent
 
 TimeSpans = list[tuple[float, float]]
 TruthSeries = list[tuple[int, float, bool]]

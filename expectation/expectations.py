@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal
 
-from language.loading.event_names import ModeEntryEvent
+from language.loading.mode_entry_event import ModeEntryEvent
 from language.model.declaration import Formula
 from language.model.system import Scenario, System
 from language.text.diagnostic import Source, Span

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from language.expressions.parser import parse_expression
-from language.expressions.syntax_tree import BoolLiteral, Logic, Not, SyntaxTree, is_same_expression
+from language.expressions.syntax_tree import BoolLiteral, Logic, Not, SyntaxTree
 from language.ir.ops import Binary, Expr, Unary
 from language.model.automaton import Transition
 from language.model.printer import format_tree
@@ -102,13 +102,9 @@ def decision_of(transition: Transition) -> Decision:
                 return ("not", joined(operand))
             case BoolLiteral(value, _):
                 return value
-        place = next(
-            (k for k, known in enumerate(conditions) if is_same_expression(known, tree)),
-            len(conditions),
-        )
-        if place == len(conditions):
+        if tree not in conditions:
             conditions.append(tree)
-        return place + len(transition.events)
+        return conditions.index(tree) + len(transition.events)
 
     structure: DecisionStructure = any_of(len(transition.events))
     guard = transition.when.tree
@@ -175,6 +171,6 @@ def _condition_text(tree: SyntaxTree) -> str:
         line = span.source.lines[span.line - 1]
         text = line[span.column - 1 : span.column - 1 + span.width]
         with suppress(SpecError):
-            if is_same_expression(parse_expression(ScalarNode(text, span)), tree):
+            if parse_expression(ScalarNode(text, span)) == tree:
                 return text
     return format_tree(tree).removeprefix("(").removesuffix(")")

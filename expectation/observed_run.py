@@ -12,10 +12,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from engine.results.samples import Event
+from engine.results.sampled_run import Event
 from engine.results.trajectory import Trajectory
 from expectation.expectations import Condition, ModePredicate, RegionRef, RunningStatistic
-from expectation.mode_names import (
+from expectation.name_resolution import (
     format_region,
     is_chart,
     leaf_modes_entered,
@@ -23,11 +23,11 @@ from expectation.mode_names import (
     path_of_mode,
 )
 from language.ir.ops import Expr, Ref, Value
-from language.loading.event_names import ModeEntryEvent
+from language.loading.mode_entry_event import ModeEntryEvent
 from language.lowering.expressions import is_whole, lower_assigned_value, lower_expression
 from language.model.system import System
 from language.numerics.evaluate import evaluate
-from language.reading.mode_reader import IMPLICIT_MODE
+from language.readers.mode_reader import IMPLICIT_MODE
 from language.typecheck.types import EnumType, ExprType, IntType
 
 NO_ROW = -1

@@ -13,7 +13,7 @@ from codegen.harness.harness import (
 )
 from codegen.harness.instruction_count import InstructionCounts, count_instructions
 from codegen.toolchain.compiler import FLAGS
-from codegen.toolchain.machine import HOST, Machine
+from codegen.toolchain.target_machine import HOST, Machine
 from language.ir.number_type import shortest_decimal
 from language.ir.program import Program, unqualified_name
 from lockstep.tick_log import TickLog

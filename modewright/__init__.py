@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from diagnosis.report.diagnosis_report import DiagnosisReport
     from engine.results.plot import Picture
     from engine.results.run_comparison import RunDifference
-    from engine.results.samples import Event
+    from engine.results.sampled_run import Event
     from engine.results.trajectory import Trajectory
     from language.text.diagnostic import Problem, SpecError, render_all
     from lockstep.comparison import Verdict
@@ -25,15 +25,15 @@ if TYPE_CHECKING:
         import_calibration,
         resolve_calibration,
     )
-    from modewright.api.checking import check
     from modewright.api.code_generation import a2l, dbc, fmu, fuzz, generate, mcdc, metrics, prove
     from modewright.api.diagnosis import diagnose, fit, save_diagnosis
     from modewright.api.recordings import CheckedRecordings, check_recordings
     from modewright.api.runs import compare, plot, read, save
     from modewright.api.simulation import Loaded, Replayed, load, lockstep, replay, simulate
+    from modewright.api.spec_check import check
     from modewright.api.spec_tests import run_tests
     from modewright.api.studies import sensitivity, study_pictures, study_summary, sweep
-    from modewright.api.traces import trace
+    from modewright.api.traceability import trace
     from modewright.diagram.diagram import Diagram, graph
     from modewright.render.study_page import study_report
 
@@ -118,7 +118,7 @@ PLACES = {
     "compare": "modewright.api.runs",
     "plot": "modewright.api.runs",
     "read": "modewright.api.runs",
-    "check": "modewright.api.checking",
+    "check": "modewright.api.spec_check",
     "check_recordings": "modewright.api.recordings",
     "diagnose": "modewright.api.diagnosis",
     "fit": "modewright.api.diagnosis",
@@ -132,7 +132,7 @@ PLACES = {
     "study_report": "modewright.render.study_page",
     "study_summary": "modewright.api.studies",
     "sweep": "modewright.api.studies",
-    "trace": "modewright.api.traces",
+    "trace": "modewright.api.traceability",
 }
 """The module of each public name; names that are absent are in `modewright.api.simulation`."""
 

@@ -13,7 +13,7 @@ import typer
 from hypothesis import settings
 
 from language.loading import load
-from modewright.runtime.gc_pause import raise_gc_threshold
+from modewright.runtime.gc_threshold import raise_gc_threshold
 from tests.support.memoised_specs import memoise_lowering, memoise_shipped
 
 load.program_of = memoise_lowering(load.program_of)  # before it is imported by name

@@ -27,7 +27,7 @@ from pathlib import Path
 from urllib.parse import unquote, urljoin, urlsplit, urlunsplit
 from urllib.response import addinfourl
 
-from index_settings import Settings, index_settings
+from package_index_settings import Settings, index_settings
 
 VERSION = "0.13.8"
 PUBLIC_INDEX = "https://pypi.org/simple"

@@ -28,7 +28,7 @@ from codegen.proofs.infeasible.infeasible_conditions import (
 )
 from codegen.toolchain.compiler import FLAGS, run_executable
 from codegen.toolchain.external_tools import output_of
-from codegen.toolchain.machine import HOST
+from codegen.toolchain.target_machine import HOST
 from language.ir.program import Program
 
 COMPILER, PROFILE_MERGER, COVERAGE_EXPORTER = "clang-19", "llvm-profdata-19", "llvm-cov-19"

@@ -27,21 +27,22 @@ from codegen.emit.c_names import (
 from codegen.emit.c_statement import INDENT, MAX_LINE_WIDTH, StatementEmitter
 from codegen.emit.c_struct import ECU_PAGE, HOST_PAGE, PageLayout, member_of, struct_members
 from codegen.emit.function_comments import describe_function
-from codegen.emit.scratch import STEP, Scratch, adjust_usages, scratch_of
+from codegen.emit.work_variables import STEP, Scratch, adjust_usages, scratch_of
 from codegen.passes.block_usage import Usage, block_usages, locals_of, loop_locals
 from codegen.passes.dead_stores import remove_dead_stores
 from codegen.passes.fast_path import EVENT_PATH, FastPathMode, add_fast_path
 from codegen.passes.inline_policy import select_noinline_blocks
 from codegen.passes.range_check_merging import LATCH_EACH, merge_range_checks
 from codegen.toolchain.templates import product_version, render
-from language.ir.ops import FaultBit, RunBlock
+from language.ir.ops import FaultBit
 from language.ir.printer import digest
-from language.ir.program import Program, Variable
-from language.ir.traversal import names_used, walk_ops
+from language.ir.program import ENTRY_BLOCKS, Program, Variable
+from language.ir.traversal import called_blocks, names_used, walk_ops
 from language.lowering.calibration_stamp import STALE_CALIBRATION
 from language.lowering.invariants import INVARIANT_PREFIX, INVARIANTS
 from language.lowering.program_builder import finalise_program
 from language.model.declaration import MICRO_STEP_LIMIT_FAULT
+from language.model.graph_algorithms import post_order
 from language.numerics.function_table import FUNCTIONS_BY_TYPE
 from language.observers.covariance_update import COVARIANCE_RANGE
 from language.programs.major_step import LIVELOCK, ZENO
@@ -79,9 +80,6 @@ def fault_reason(program: Program, fault: str) -> str:
     names = dict.fromkeys(name for name in set_by if name)
     return RANGE_REASON.format(" or ".join(names)) if names else ""
 
-
-ENTRY_BLOCKS = ("init", "derive", "step")
-"""The blocks that are entry points of a module."""
 
 COLD_BLOCKS = (LATCH_EACH, EVENT_PATH, "rollback_")
 """Prefixes of blocks that run rarely and are not inlined."""
@@ -298,7 +296,8 @@ def _emit_functions(
     noinline = select_noinline_blocks(program)
     modes, run_modes = ([m.name for m in of] for of in (program.modes, program.run_modes))
     functions = []
-    for name in _order_callees_first(program):
+    calls = {name: called_blocks(block) for name, block in program.blocks.items()}
+    for name in post_order(calls):
         keyword = _inline_keyword(name, noinline)
         function = _emit_function(
             program,
@@ -384,27 +383,3 @@ def _format_parameters(opening: str, parameters: Sequence[str]) -> str:
 def _redirect_derived(block: str, line: str) -> str:
     """Return a line of a function; `X_Derive` writes derived constants through its own pointer."""
     return line.replace("self->derived.", "derived->") if block == "derive" else line
-
-
-def _order_callees_first(program: Program) -> list[str]:
-    """Return the names of the blocks such that each comes after those that it runs.
-
-    C then needs no prototypes.
-    """
-    done: dict[str, None] = {}
-
-    def visit(name: str) -> None:
-        if name in done:
-            return
-        for called in _called_blocks(program, name):
-            visit(called)
-        done[name] = None
-
-    for name in program.blocks:
-        visit(name)
-    return list(done)
-
-
-def _called_blocks(program: Program, name: str) -> list[str]:
-    """Return the blocks that a block runs directly."""
-    return [op.block for op in walk_ops(program.blocks[name]) if isinstance(op, RunBlock)]

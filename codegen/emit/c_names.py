@@ -18,7 +18,7 @@ from language.ir.program import (
     mode_variable,
     unqualified_name,
 )
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 
 C_REAL_TYPE: Mapping[NumberType, str] = {"float64": "double", "float32": "float"}
 """The C type of a real by the number type."""

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from codegen.toolchain.compiler import FLAGS
 from codegen.toolchain.external_tools import ARM_COMPILER, ARM_LINES, ARM_OBJECTS, output_of
-from codegen.toolchain.machine import CORTEX_FLAGS, CORTEX_LINK_FLAGS
+from codegen.toolchain.target_machine import CORTEX_FLAGS, CORTEX_LINK_FLAGS
 
 IMAGE_FILE = "image.elf"
 """The name of the linked program."""

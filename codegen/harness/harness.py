@@ -13,8 +13,8 @@ from codegen.emit.c_module import emit_c_files, restrict_to_step
 from codegen.emit.c_names import C_REAL_TYPE, CNames, c_member, c_type
 from codegen.toolchain.build_cache import get_or_build, key_of
 from codegen.toolchain.compiler import FLAGS, WARNINGS, compiler_version, run_compiler
-from codegen.toolchain.machine import HOST, Machine, harness_file
 from codegen.toolchain.object_cache import substitute_objects
+from codegen.toolchain.target_machine import HOST, Machine, harness_file
 from codegen.toolchain.templates import render
 from language.ir.program import Constant, Program, Variable
 

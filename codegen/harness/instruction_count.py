@@ -9,7 +9,7 @@ from functools import cached_property
 
 from codegen.harness.harness import HarnessMain, build_executable
 from codegen.toolchain.compiler import FLAGS
-from codegen.toolchain.machine import CORTEX_M4F, run_in_qemu
+from codegen.toolchain.target_machine import CORTEX_M4F, run_in_qemu
 from language.ir.program import Program
 
 COUNTING_MAIN = HarnessMain(

@@ -14,7 +14,7 @@ from codegen.harness.stack_usage import stack_usage
 from codegen.harness.worst_case_instructions import UnboundedError, worst_case_instructions
 from codegen.toolchain.compiler import FLAGS
 from codegen.toolchain.external_tools import ARM_COMPILER, ARM_SIZE, output_of
-from codegen.toolchain.machine import CORTEX_FLAGS
+from codegen.toolchain.target_machine import CORTEX_FLAGS
 from language.ir.program import Program
 
 STRUCTURES = ("Self", "In", "Out")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from codegen.toolchain.compiler import FLAGS, BuildError
 from codegen.toolchain.external_tools import ARM_COMPILER, output_of
-from codegen.toolchain.machine import CORTEX_FLAGS
+from codegen.toolchain.target_machine import CORTEX_FLAGS
 from codegen.toolchain.tool_verdict import ToolVerdict, tool_version
 
 MAX_STEP_STACK_BYTES = 256

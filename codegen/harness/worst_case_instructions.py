@@ -16,7 +16,7 @@ from math import prod
 from pathlib import Path
 
 from codegen.harness.disassembly import Instruction, disassemble
-from language.model.graphs import strongly_connected_components
+from language.model.graph_algorithms import strongly_connected_components
 
 CONDITION = re.compile("(eq|ne|cs|hs|cc|lo|mi|pl|vs|vc|hi|ls|ge|lt|gt|le)?")
 """A condition code of ARM, or none."""

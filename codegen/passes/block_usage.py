@@ -10,9 +10,16 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from codegen.passes.definite_assignment import find_unassigned_reads
-from language.ir.ops import Assign, Block, Branch, Loop, RunBlock, Switch
+from language.ir.ops import Assign, Block, Branch, Loop, Switch
 from language.ir.program import Program
-from language.ir.traversal import block_reads, block_writes, reachable_blocks, walk_ops
+from language.ir.traversal import (
+    block_reads,
+    block_writes,
+    called_blocks,
+    reachable_blocks,
+    walk_ops,
+)
+from language.model.graph_algorithms import post_order
 from language.programs.major_step import STEP_INTERFACE
 
 POINTER_OF_GROUP = {
@@ -61,23 +68,17 @@ def block_usages(
     """
     groups = {**POINTER_OF_GROUP, **dict.fromkeys(page_groups, "cal")}
     usage_by_block: dict[str, Usage] = {}
-
-    def visit(name: str) -> Usage:
-        if name not in usage_by_block:
-            read = {n for n in block_reads(program.blocks[name]) if n not in local[name]}
-            written = {n for n in block_writes(program.blocks[name]) if n not in local[name]}
-            needs = {groups.get(n.partition(".")[0], "") for n in read | written} - {""}
-            writes = {groups.get(n.partition(".")[0], "") for n in written} - {""}
-            for op in walk_ops(program.blocks[name]):
-                if isinstance(op, RunBlock):
-                    inner = visit(op.block)
-                    needs |= inner.needs
-                    writes |= inner.writes
-            usage_by_block[name] = Usage(frozenset(needs), frozenset(writes))
-        return usage_by_block[name]
-
-    for name in program.blocks:
-        visit(name)
+    calls = {name: called_blocks(block) for name, block in program.blocks.items()}
+    for name in post_order(calls):
+        read = {n for n in block_reads(program.blocks[name]) if n not in local[name]}
+        written = {n for n in block_writes(program.blocks[name]) if n not in local[name]}
+        inner = [usage_by_block[called] for called in calls[name]]
+        needs = {groups.get(n.partition(".")[0], "") for n in read | written} - {""}
+        writes = {groups.get(n.partition(".")[0], "") for n in written} - {""}
+        usage_by_block[name] = Usage(
+            frozenset(needs).union(*(one.needs for one in inner)),
+            frozenset(writes).union(*(one.writes for one in inner)),
+        )
     return usage_by_block
 
 

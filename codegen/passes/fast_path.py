@@ -55,7 +55,7 @@ from language.ir.ops import (
     Unary,
     Value,
 )
-from language.ir.program import MODE_VARIABLE, ModeInfo, Program, Variable
+from language.ir.program import ENTRY_BLOCKS, MODE_VARIABLE, ModeInfo, Program, Variable
 from language.ir.rewrite_ops import direct_expressions, map_expressions, map_operands
 from language.ir.traversal import block_writes, expr_names, names_used
 from language.lowering.program_builder import finalise_program
@@ -64,8 +64,6 @@ from language.programs.model_run import RUN_MODE
 FastPathMode = Literal["on", "anew", "off"]
 """Whether fast paths are added. `anew` computes all equations in each step; it is needed where
 states are set between steps, as in a predictor, so that values of the step before are not valid."""
-ENTRY_BLOCKS = ("init", "derive", "step")
-"""The blocks that are entry points of a module."""
 FAST_PATH, FAST_PATH_TAKEN, RECORD_BLOCK, STARTED = (
     "fast_path",
     "memory.is_fast_path_taken",

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from language.ir.ops import Binary, Block, Expr, Item, Loop, Ref, RunBlock, Value
 from language.ir.program import Program
 from language.ir.rewrite_ops import direct_expressions, walk_post_order
-from language.ir.traversal import walk_ops
+from language.ir.traversal import called_blocks, walk_ops
 
 ARITHMETIC = ("+", "-", "*", "/")
 """Operators whose floating-point operations are counted."""
@@ -61,7 +61,7 @@ def _call_sites(block: Block) -> Iterator[str]:
         if isinstance(op, RunBlock):
             yield op.block
         if isinstance(op, Loop):
-            yield from (inner.block for inner in walk_ops(op.body) if isinstance(inner, RunBlock))
+            yield from called_blocks(op.body)
 
 
 def _count_float_operations(program: Program, name: str) -> int:

@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Hashable
 from dataclasses import dataclass
 
 from language.ir.ops import (
@@ -14,8 +12,6 @@ from language.ir.ops import (
     Binary,
     Block,
     Branch,
-    Call,
-    Compare,
     Expr,
     FaultBit,
     Loop,
@@ -24,13 +20,13 @@ from language.ir.ops import (
     RunBlock,
     Select,
     Switch,
-    Unary,
     Value,
 )
 from language.ir.program import Program, Variable
 from language.ir.rewrite_ops import map_expressions, map_operands, operands
 from language.ir.traversal import block_reads, block_writes, expr_names, negate_condition
 from language.numerics.evaluate import evaluate
+from language.passes.value_numbering import ValueNumbering
 
 WORK, TIME_LEFT, CROSSED = "work.", "work.left", "work.crossed"
 """The prefix of work variables, the time left in a step, and the flag of a crossing."""
@@ -68,9 +64,7 @@ class ExecutionPath:
         self.prologue: list[Op] = []
         self.ops = self.prologue
         self._variable_by_name = {variable.name: variable for variable in program.variables}
-        self._versions: Counter[str] = Counter()
-        self._value_numbers: dict[Hashable, int] = {}
-        self._number_by_name: dict[str, int | None] = {}
+        self._values = ValueNumbering()
         self._name_by_number: dict[int, str] = {}
         self._has_evaluated = False
 
@@ -96,8 +90,8 @@ class ExecutionPath:
                     for n in expr_names(value)
                 ):
                     reused.add(op.target)
-                    self._number_by_name[op.target] = number = self._value_number(value)
-                    if number is not None and not op.target.startswith(WORK):
+                    self._values.number_by_name[op.target] = number = self._values.number_of(value)
+                    if not op.target.startswith(WORK):
                         self._name_by_number.setdefault(number, op.target)
 
     def follow(self, block: Block) -> None:
@@ -156,12 +150,12 @@ class ExecutionPath:
             self.is_event_free = Value(True) if value == Value(False) else negate_condition(value)
             value = Value(False)
             self.ops = []
-        number = self._value_number(value)
+        number = self._values.number_of(value)
         if number in self._name_by_number and not isinstance(value, Value | Ref):
             value = Ref(self._name_by_number[number])
-        self._versions[target] += 1
+        self._values.versions[target] += 1
         if target.startswith(WORK) and not isinstance(value, Value | Ref):
-            name = f"{target}_{self._versions[target]}"
+            name = f"{target}_{self._values.versions[target]}"
             self.values[name] = PathValue(self._variable_by_name[target], self.points)
             self.ops.append(Assign(name, value, key))
             self._record_name(name, number)
@@ -227,8 +221,8 @@ class ExecutionPath:
 
     def _invalidate(self, name: str) -> None:
         """Forget what is known of a variable, and of others that equal it: its value changes."""
-        self._versions[name] += 1
-        self._number_by_name.pop(name, None)
+        self._values.versions[name] += 1
+        self._values.number_by_name.pop(name, None)
         self._name_by_number = {
             number: held for number, held in self._name_by_number.items() if held != name
         }
@@ -237,39 +231,13 @@ class ExecutionPath:
         for other in [n for n, held in known if isinstance(held, Ref) and held.name == name]:
             del self.known[other]
 
-    def _record_name(self, name: str, number: int | None) -> None:
+    def _record_name(self, name: str, number: int) -> None:
         """Record that a name holds the value with a number.
 
         The first name of a value is used for it.
         """
-        self._number_by_name[name] = number
-        if number is not None:
-            self._name_by_number.setdefault(number, name)
-
-    def _value_number(self, value: Expr) -> int | None:
-        """Return the value number of an expression.
-
-        Returns None if it has none (a choice or an array element). Equal operations on equal
-        numbers have equal numbers, as in language/passes/common_subexpressions.py. A name has the
-        number of its value.
-        """
-        key: Hashable = None
-        match value:
-            case Value(known):
-                key = repr(known)
-            case Ref(name) if name in self._number_by_name:
-                return self._number_by_name[name]
-            case Ref(name):
-                key = name, self._versions[name]
-            case Binary(operator, left, right) | Compare(operator, left, right):
-                key = operator, self._value_number(left), self._value_number(right)
-            case Unary(operator, operand):
-                key = operator, self._value_number(operand)
-            case Call(function, arguments):
-                key = function, *(self._value_number(argument) for argument in arguments)
-        if key is None or (isinstance(key, tuple) and None in key):
-            return None
-        return self._value_numbers.setdefault(key, len(self._value_numbers))
+        self._values.number_by_name[name] = number
+        self._name_by_number.setdefault(number, name)
 
 
 def _writes_only_persistent(block: Block) -> bool:

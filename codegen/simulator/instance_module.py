@@ -11,11 +11,11 @@ from codegen.emit.c_names import CNames, c_member
 from codegen.passes.block_usage import block_usages, locals_of
 from codegen.passes.range_violation_flags import RANGE_VIOLATION_FLAG, ranged_signals
 from codegen.simulator.signal_names import INSTANCE_NAME, SignalNameMap, row_width
-from codegen.simulator.simd_variants import simd_batch_context
+from codegen.simulator.simd_batch import simd_batch_context
 from language.ir.program import LOG_COUNT_VARIABLE, LOG_VARIABLE, Program
 from language.lowering.continuous_delay import RECORD_AGE
 from language.programs.major_step import MAX_EVENTS_PER_STEP
-from language.programs.simulation_assembly import (
+from language.programs.system_program import (
     RANGE_TOLERANCE,
     SimulationAssembly,
     input_name,

@@ -10,7 +10,7 @@ from codegen.emit.c_names import CNames
 from language.ir.number_type import NumberType
 from language.ir.ops import Assign
 from language.ir.program import Program, unqualified_name
-from language.programs.simulation_assembly import SimulationAssembly, output_variables
+from language.programs.system_program import SimulationAssembly, output_variables
 
 INSTANCE_NAME = "i_{}"
 """The C name of an instance or sensor, whose own name may be a keyword of C."""

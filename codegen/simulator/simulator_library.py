@@ -6,7 +6,6 @@ The call of C releases Python's global lock, so several threads may each run a p
 from __future__ import annotations
 
 import ctypes
-import subprocess
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,12 +14,18 @@ from pathlib import Path
 from typing import Any
 
 from codegen.simulator.signal_names import column_positions, row_width
-from codegen.simulator.simd_variants import LANES
+from codegen.simulator.simd_batch import LANES
 from codegen.simulator.simulator_source import emit_simulator_files
 from codegen.toolchain.build_cache import cache_folder, get_or_build, key_of
-from codegen.toolchain.compiler import FLAGS, TIMEOUT, BuildError, compiler_version, find_compiler
+from codegen.toolchain.compiler import (
+    FLAGS,
+    compiler_version,
+    find_compiler,
+    run_compiler,
+    run_compilers,
+)
 from codegen.toolchain.object_cache import is_shared, object_of
-from language.programs.simulation_assembly import SimulationAssembly
+from language.programs.system_program import SimulationAssembly
 
 Pointer = ctypes.c_void_p
 Int64 = ctypes.c_int64
@@ -236,30 +241,15 @@ def build_library(
     """Compile the sources in parallel and link them to the shared library `target`.
 
     Objects are written beside the sources; those of shared sources (`is_shared`) come from the
-    cache. Raises BuildError with the compiler's message, MissingToolError;
-    subprocess.TimeoutExpired after TIMEOUT seconds.
+    cache. Raises MissingToolError, and BuildError like `run_compilers`.
     """
     command = find_compiler(compiler_name)
     compile_command = [*command, *flags, "-fPIC"]
     version, room = compiler_version(compiler_name), sources[0].parent / "objects"
     shared = [object_of(s, compile_command, version, room) for s in sources if is_shared(s)]
-    objects = [source.with_suffix(".o") for source in sources if not is_shared(source)]
-    running = [
-        subprocess.Popen(
-            [*compile_command, "-c", str(made.with_suffix(".c")), "-o", str(made)],
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        for made in objects
-    ]
-    for process in running:
-        _, message = process.communicate(timeout=TIMEOUT)
-        if process.returncode != 0:
-            raise BuildError(message.strip())
-    link = [*command, "-shared", *map(str, objects + shared), "-lm", "-o", str(target)]
-    done = subprocess.run(link, capture_output=True, text=True, timeout=TIMEOUT, check=False)
-    if done.returncode != 0:
-        raise BuildError(done.stderr.strip())
+    own = {source.with_suffix(".o"): source for source in sources if not is_shared(source)}
+    run_compilers([([*compile_command, "-c", str(source)], made) for made, source in own.items()])
+    run_compiler([*command, "-shared", *map(str, [*own, *shared]), "-lm"], target)
 
 
 def _struct_member(value: Any, keep_alive: list[Any]) -> Any:

@@ -29,16 +29,16 @@ from codegen.simulator.signal_names import (
     emit_wire_formula,
     row_width,
 )
-from codegen.simulator.simd_variants import LANES
+from codegen.simulator.simd_batch import LANES
 from codegen.toolchain.templates import product_version, render
 from language.ir.number_type import NumberType
 from language.ir.program import Program, unqualified_name
-from language.ir.traversal import block_names
+from language.ir.traversal import names_used
 from language.lowering.program_builder import finalise_program
 from language.model.system import Sensor
 from language.programs.continuous_program import ENGINE_BLOCKS
 from language.programs.major_step import STEP_INTERFACE
-from language.programs.simulation_assembly import (
+from language.programs.system_program import (
     InputSource,
     InputTrajectory,
     SimulationAssembly,
@@ -110,7 +110,7 @@ def _driver_context(
     ]
     row_names = dataclasses.replace(signal_names, is_row=True)
     sensors = [_sensor_context(sensor, signal_names) for sensor in assembly.sensors.values()]
-    wired = {name for block in assembly.wires.blocks.values() for name in block_names(block)}
+    wired = names_used(assembly.wires.blocks.values())
     called = {name for name in wired if name.startswith("call ")}
     has_lag = any(sensor.lag for sensor in assembly.sensors.values())
     return {

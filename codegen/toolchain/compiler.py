@@ -6,9 +6,11 @@ import os
 import shlex
 import shutil
 import subprocess
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from functools import cache
 from pathlib import Path
+from typing import TypedDict
 
 from language.text.diagnostic import MissingToolError
 
@@ -33,8 +35,18 @@ WARNINGS = [
 ]
 """The warnings under which generated C compiles without a message."""
 
+
+class TextOptions(TypedDict):
+    """Options of `subprocess` for output as text."""
+
+    encoding: str
+    errors: str
+
+
 TIMEOUT = 120
 """Time limit of a compilation or a run [s]."""
+AS_TEXT: TextOptions = {"encoding": "utf-8", "errors": "replace"}
+"""Options of a process whose output is text; bytes that are not UTF-8 are replaced."""
 
 
 class BuildError(Exception):
@@ -42,6 +54,21 @@ class BuildError(Exception):
 
     The message is that of the compiler or of the program.
     """
+
+
+@contextmanager
+def convert_process_errors(name: str) -> Iterator[None]:
+    """Return a context that raises BuildError for a process that does not start or end in time.
+
+    `name` is the subject of the message, like "the compiler". Converted are OSError and
+    subprocess.TimeoutExpired; other exceptions leave the context unchanged.
+    """
+    try:
+        yield
+    except subprocess.TimeoutExpired as error:
+        raise BuildError(f"{name} was not done after {error.timeout:g} s") from None
+    except OSError as error:
+        raise BuildError(f"{name} does not run: {error}") from None
 
 
 def find_compiler(name: str | None = None) -> list[str]:
@@ -72,12 +99,10 @@ def compiler_version(name: str | None = None) -> str:
     if it cannot be started or does not end in TIMEOUT seconds.
     """
     command = find_compiler(name)
-    try:
+    with convert_process_errors(f"the C compiler `{command[0]}`"):
         done = subprocess.run(
-            [*command, "--version"], capture_output=True, text=True, timeout=TIMEOUT, check=False
+            [*command, "--version"], capture_output=True, timeout=TIMEOUT, check=False, **AS_TEXT
         )
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise BuildError(f"the C compiler `{command[0]}` does not run: {error}") from None
     first = (done.stdout or done.stderr).strip().split("\n")[0]
     return f"{os.path.realpath(shutil.which(command[0]) or command[0])}: {first}"
 
@@ -100,17 +125,37 @@ def compile_program(
 def run_compiler(command: Sequence[str], target: Path) -> None:
     """Run a compiler command with `-o target` appended.
 
-    Raises BuildError for a nonzero exit code, with its output from the first error on, and after
-    TIMEOUT seconds. Warnings are dropped.
+    Raises BuildError for a nonzero exit code, with its output from the first error on, if it does
+    not start, and after TIMEOUT seconds. Warnings are dropped.
     """
-    try:
-        done = subprocess.run(
-            [*command, "-o", str(target)], capture_output=True, text=True, timeout=TIMEOUT
-        )
-    except subprocess.TimeoutExpired:
-        raise BuildError(f"the compiler was not done after {TIMEOUT} s") from None
-    if done.returncode != 0:
-        raise BuildError(_first_error(done.stderr) or f"the compiler ended with {done.returncode}")
+    run_compilers([(command, target)])
+
+
+def run_compilers(commands: Sequence[tuple[Sequence[str], Path]]) -> None:
+    """Run compiler commands at the same time, each with `-o` and its target appended.
+
+    Raises BuildError like `run_compiler` for the first command of the sequence that fails; the
+    other processes are killed. TIMEOUT counts for each process that is waited for.
+    """
+    with ExitStack() as stack:
+        running = []
+        for command, target in commands:
+            with convert_process_errors("the compiler"):
+                process = subprocess.Popen(
+                    [*command, "-o", str(target)],
+                    stdout=subprocess.DEVNULL,
+                    stderr=subprocess.PIPE,
+                    **AS_TEXT,
+                )
+            running.append(stack.enter_context(process))
+            stack.callback(process.kill)
+        for process in running:
+            with convert_process_errors("the compiler"):
+                _, message = process.communicate(timeout=TIMEOUT)
+            if process.returncode != 0:
+                raise BuildError(
+                    _first_error(message) or f"the compiler ended with {process.returncode}"
+                )
 
 
 def run_executable(
@@ -118,16 +163,14 @@ def run_executable(
 ) -> bytes:
     """Run an executable with input records as its standard input; return its standard output.
 
-    `extra_environment` is added to the environment. Raises BuildError for a nonzero exit code and
-    after TIMEOUT seconds.
+    `extra_environment` is added to the environment. Raises BuildError for a nonzero exit code, if
+    it does not start, and after TIMEOUT seconds.
     """
     environment = {**os.environ, **(extra_environment or {})}
-    try:
+    with convert_process_errors("the compiled program"):
         done = subprocess.run(
             [str(target)], input=records, capture_output=True, env=environment, timeout=TIMEOUT
         )
-    except subprocess.TimeoutExpired:
-        raise BuildError(f"the compiled program was not done after {TIMEOUT} s") from None
     if done.returncode != 0:
         raise BuildError(f"the compiled program ended with {done.returncode}")
     return done.stdout
@@ -154,8 +197,11 @@ def _has_gcc_vectors(command: tuple[str, ...]) -> bool:
     """Tell the same of a compiler command, from its predefined macros; False if it does not run."""
     query = [*command, "-dM", "-E", "-x", "c", "-"]
     try:
-        result = subprocess.run(query, input="", capture_output=True, text=True, timeout=TIMEOUT)
-    except (OSError, subprocess.TimeoutExpired):
+        with convert_process_errors("the compiler"):
+            result = subprocess.run(
+                query, input="", capture_output=True, timeout=TIMEOUT, check=False, **AS_TEXT
+            )
+    except BuildError:
         return False
     macros = {line.split()[1] for line in result.stdout.splitlines() if line.startswith("#define ")}
     return {"__GNUC__", "__x86_64__"} <= macros and "__clang__" not in macros

@@ -8,7 +8,7 @@ import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from codegen.toolchain.compiler import BuildError
+from codegen.toolchain.compiler import AS_TEXT, BuildError, convert_process_errors
 from language.text.diagnostic import MissingToolError
 
 ARM_COMPILER = "arm-none-eabi-gcc"
@@ -51,21 +51,19 @@ def run_tool(
     """Run a tool in a folder and return the completed process, whatever its exit code.
 
     Its output is captured as text. `extra_environment` is added to the environment. Raises
-    MissingToolError; BuildError after TOOL_TIMEOUT seconds.
+    MissingToolError; BuildError if it does not start, and after TOOL_TIMEOUT seconds.
     """
     tool, *words = command
-    try:
+    with convert_process_errors(tool):
         return subprocess.run(
             [require_tool(tool), *words],
             cwd=folder,
             env={**os.environ, "PWD": str(folder), **(extra_environment or {})},
             capture_output=True,
-            text=True,
             timeout=TOOL_TIMEOUT,
             check=False,
+            **AS_TEXT,
         )
-    except subprocess.TimeoutExpired:
-        raise BuildError(f"{tool} was not done after {TOOL_TIMEOUT} s") from None
 
 
 def output_of(

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from diagnosis.data.arrays import Reals
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.estimate import Estimate, predict_with_gains_of
 from diagnosis.estimation.innovations import FOLDS, PredictionResult

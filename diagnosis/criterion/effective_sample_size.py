@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from diagnosis.data.arrays import Reals
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.estimate import Estimate
 

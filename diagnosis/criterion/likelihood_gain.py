@@ -13,7 +13,7 @@ import numpy as np
 
 from diagnosis.criterion.cross_validation import cross_validated_squares
 from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
-from diagnosis.data.arrays import Reals
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.estimate import Estimate
 

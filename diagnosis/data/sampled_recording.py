@@ -21,7 +21,7 @@ from diagnosis.data.noise_estimate import noise_of
 from diagnosis.data.time_resolution import time_resolution
 from engine.recordings.recording import Channel, Recording, split_by_windows
 from language.model.automaton import Automaton
-from language.model.graphs import reachable
+from language.model.graph_algorithms import reachable
 from language.model.system import RecordingMap
 
 Reals = NDArray[np.float64]
@@ -177,7 +177,8 @@ def resample(
     """Return recordings with the given hold, decimated if no compared output has feed-through.
 
     With direct feed-through (`has_feedthrough`) the recordings keep their samples and only the hold
-    is set, because an output that follows the mean of an input was never measured.
+    is set, because an output that follows the mean of an input was never measured. Raises
+    ValueError as `decimate`.
     """
     if has_feedthrough(automaton, output_names):
         return tuple(
@@ -226,11 +227,15 @@ def decimate(
     n is `longest` over the period, rounded down and at least 1; samples after the last
     full group of n are dropped. Outputs are the first of each n samples (no filter). A held input
     is the mean of the n samples; an input with first-order hold is the mean over a centred window
-    of n samples (n + 1 if n is even), with the edge values repeated. The cost
-    of a fit is proportional to the number of samples.
+    of n samples (n + 1 if n is even), with the edge values repeated. The cost of a fit is
+    proportional to the number of samples. Raises ValueError for fewer than n samples.
     """
     factor = max(1, int(longest / series.period))
     count = series.count // factor
+    if count == 0:
+        raise ValueError(
+            f"{series.name}: only {series.count} samples, {factor} are averaged to one"
+        )
     inputs = series.inputs[: count * factor]
     if is_first_order_hold and factor > 1:
         around = np.pad(inputs, ((factor // 2, factor // 2), (0, 0)), mode="edge")

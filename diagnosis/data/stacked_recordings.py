@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.predictor.predictions import StackedRecordings
+from codegen.predictor.predictor_arrays import StackedRecordings
 from diagnosis.data.sampled_recording import SampledRecording
 
 Reals = NDArray[np.float64]

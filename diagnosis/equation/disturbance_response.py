@@ -15,17 +15,17 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.predictor.predictions import Prediction, StackedRecordings
+from codegen.predictor.predictor_arrays import Prediction, StackedRecordings
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.data.stacked_recordings import burn_in_samples, stack_recordings
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.model_set import ModelSet
-from diagnosis.localisation.acting_scale import DISTURBANCE_KIND_BY_SECTION
+from diagnosis.localisation.reference_magnitude import DISTURBANCE_KIND_BY_SECTION
 from diagnosis.model.candidate import Candidate, compile_candidate
 from diagnosis.model.placed_effect import DISTURBANCE_STATE, PlacedEffect, disturbance_effect
 from language.expressions.syntax_tree import Name
 from language.model.automaton import Automaton
-from language.reading.element_reader import outputs_as_mapping
+from language.readers.element_reader import outputs_as_mapping
 from language.text.document import Document, Entry, MappingNode, ScalarNode
 
 Reals = NDArray[np.float64]

@@ -13,11 +13,11 @@ from diagnosis.equation.disturbance_response import element_torques
 from diagnosis.equation.term_library import LibraryTerm
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.estimation.quantity import Quantity
-from diagnosis.localisation.acting_scale import disturbance_unit
+from diagnosis.localisation.reference_magnitude import disturbance_unit
 from diagnosis.model.placed_effect import PlacedEffect
 from language.expressions.units import Dimension, dimension_product, parse_unit
 from language.overlays.effect_reader import external_names, read_effect
-from language.overlays.tree_types import TreeTypes, format_si_unit
+from language.overlays.name_types import TreeTypes, format_si_unit
 from language.text.diagnostic import Problems, Source, Span
 from language.text.document import Document, ScalarNode
 from language.text.project_files import parse_document

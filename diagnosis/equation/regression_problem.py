@@ -8,17 +8,17 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.predictor.predictions import Prediction
+from codegen.predictor.predictor_arrays import Prediction
 from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
 from diagnosis.equation.disturbance_response import DisturbanceResponse, build_disturbance_response
 from diagnosis.equation.forward_regression import RegressionProblem, TermColumns, build_problem
 from diagnosis.equation.term_library import LibraryTerm, Signals, generate_terms
 from diagnosis.estimation.estimate import Estimate, with_normal_equations
 from diagnosis.estimation.model_set import ModelSet
-from diagnosis.localisation.acting_scale import place_bindings
 from diagnosis.localisation.correlate import angle_rates
+from diagnosis.localisation.reference_magnitude import place_bindings
 from language.expressions.units import Dimension
-from language.overlays.tree_types import TreeTypes, format_si_unit
+from language.overlays.name_types import TreeTypes, format_si_unit
 
 Reals = NDArray[np.float64]
 TEST_DISTURBANCE = 0.1

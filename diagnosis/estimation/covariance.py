@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from diagnosis.data.arrays import Reals
+from diagnosis.data.array_types import Reals
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.normal_equations import solve
 from diagnosis.estimation.quantity import Quantity

@@ -15,8 +15,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.predictor.predictions import Prediction, StackedPrediction, StackedRecordings
 from codegen.predictor.predictor import Predictor
+from codegen.predictor.predictor_arrays import Prediction, StackedPrediction, StackedRecordings
 from diagnosis.data.noise_estimate import MAD_TO_STD
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.data.stacked_recordings import stack_recordings

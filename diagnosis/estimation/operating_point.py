@@ -12,7 +12,7 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.predictor.predictions import StackedPrediction
+from codegen.predictor.predictor_arrays import StackedPrediction
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.innovations import PredictionResult
 from diagnosis.estimation.linearisation import LinearModel, linearise

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.model_set import ModelSet
 from language.expressions.units import Dimension
-from language.overlays.tree_types import TreeTypes
+from language.overlays.name_types import TreeTypes
 
 Reals = NDArray[np.float64]
 FORCE_UNITS = ("N*m", "N")

@@ -18,7 +18,7 @@ from diagnosis.estimation.model_set import ModelSet
 from diagnosis.localisation.correlate import order_features
 from diagnosis.localisation.location import Location
 from language.expressions.text_rewrite import names_in_text
-from language.overlays.tree_types import formula_entries
+from language.overlays.name_types import formula_entries
 
 Reals = NDArray[np.float64]
 RIPPLE_CORRELATION = 0.6

@@ -156,7 +156,8 @@ def compile_candidate(
         f"{placed_effect.id} {placed_effect.suffix} {node_text(placed_effect.effect.body)}"
         for placed_effect in all_layers
     ]
-    key = cache_key(node_text(document.root), *parts, *output_names, str(period))
+    counts = f"{len(placed_effects)} effects, {len(disturbances)} disturbances"
+    key = cache_key(node_text(document.root), counts, *parts, *output_names, str(period))
 
     def make() -> tuple[CompiledModel, bytes]:
         made = automaton_with_effects(document, project, all_layers)

@@ -63,12 +63,13 @@ class CompiledModel:
 def cache_key(*parts: str) -> str:
     """Return the SHA-256 key (hex) of texts and of the code that compiles candidates.
 
-    The order of the texts counts. The code is that of `language`, `codegen` and
+    The order of the texts counts; each one ends with a NUL byte, which no document contains. The
+    code is that of `language`, `codegen` and
     `COMPILATION_MODULES`.
     """
     digest = hashlib.sha256(code_digest(COMPILATION_MODULES).encode())
     for part in parts:
-        digest.update(part.encode() + b"\\0")
+        digest.update(part.encode() + b"\0")
     return digest.hexdigest()
 
 
@@ -133,7 +134,7 @@ def code_digest(patterns: tuple[str, ...] = ("*",)) -> str:
     ]
     files += [file for name in patterns for file in _source_files(_package_folder(diagnosis), name)]
     for path in sorted(files):
-        digest.update(path.name.encode() + path.read_bytes())
+        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
 
 

@@ -9,7 +9,7 @@ from diagnosis.model.equation_change import EquationChange, equation_changes
 from diagnosis.model.placed_effect import PlacedEffect, automaton_with_effects, find_placements
 from language.overlays.effect_reader import DESCRIPTION_KEYS, Effect, PlacePattern, read_effect
 from language.overlays.expand_document import Project
-from language.overlays.tree_types import format_si_unit
+from language.overlays.name_types import format_si_unit
 from language.text.diagnostic import Problems, Source, Span, SpecError
 from language.text.document import Document, MappingNode
 

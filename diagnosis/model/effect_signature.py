@@ -24,7 +24,7 @@ from language.loading.scenario_reader import read_scenario
 from language.loading.system_reader import single_instance_system
 from language.model.automaton import Automaton
 from language.overlays.expand_document import Project
-from language.overlays.tree_types import format_si_unit
+from language.overlays.name_types import format_si_unit
 from language.text.diagnostic import Source
 from language.text.document import Document
 from language.text.project_files import parse_document

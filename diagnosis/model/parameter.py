@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from language.model.automaton import Automaton
 from language.model.declaration import Parameter
-from language.overlays.tree_types import format_si_unit
+from language.overlays.name_types import format_si_unit
 
 Reals = NDArray[np.float64]
 PRIOR_STD = 0.15

@@ -25,7 +25,7 @@ from language.overlays.apply_effect import apply_effect
 from language.overlays.effect_place import PlaceMismatch, find_effect_place
 from language.overlays.effect_reader import Effect, EffectApplication, added_names, read_effect
 from language.overlays.expand_document import Project, read_document
-from language.overlays.tree_types import formula_entries
+from language.overlays.name_types import formula_entries
 from language.text.diagnostic import Problems, Source, Span
 from language.text.document import Document, MappingNode, ScalarNode
 

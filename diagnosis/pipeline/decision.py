@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from diagnosis.criterion.threshold import DEFAULT_THRESHOLD, DEFAULT_THRESHOLDS, Thresholds
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.equation.discovery import DiscoveredEquation, discover_equation
-from diagnosis.equation.trigger import (
+from diagnosis.equation.discovery_criteria import (
     has_large_remainder,
     needs_no_disturbance,
     outperforms_effects,
@@ -23,7 +23,7 @@ from diagnosis.estimation.noise_level import disturbance_units
 from diagnosis.localisation.location import Location
 from diagnosis.localisation.location_text import format_location
 from diagnosis.localisation.ranking import localise, unexplained_gain
-from diagnosis.pipeline.case import Case
+from diagnosis.pipeline.diagnosis_case import Case
 from diagnosis.result.effect_naming import verdict_id
 from diagnosis.result.verdict import DecisionOutcome
 from diagnosis.selection.active_bound import has_opposing_active_bound

@@ -28,14 +28,14 @@ from diagnosis.estimation.covariance import quantities_of
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.initial_input import average_initial_inputs, choose_initial_inputs
 from diagnosis.estimation.model_set import ModelSet
-from diagnosis.estimation.per_recording import reestimate_per_recording
+from diagnosis.estimation.per_recording_parameters import reestimate_per_recording
 from diagnosis.experiment.discrimination import ExperimentPlan, plan_experiment
 from diagnosis.localisation.location import Location
 from diagnosis.localisation.location_text import format_location
 from diagnosis.localisation.ranking import rank_accepted_first, rank_causes_first
 from diagnosis.model.placed_effect import PlacedEffect, place_path
-from diagnosis.pipeline.case import Case, build_model_set, read_series
 from diagnosis.pipeline.decision import decide
+from diagnosis.pipeline.diagnosis_case import Case, build_model_set, read_series
 from diagnosis.result.effect_naming import named_effect_of, verdict_id
 from diagnosis.result.verdict import DecisionOutcome, NamedEffect, RankedCandidate, Verdict
 from diagnosis.selection.candidate_search import CandidateFit, LogCallback

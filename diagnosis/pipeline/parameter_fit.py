@@ -19,7 +19,7 @@ from diagnosis.estimation.quantity import Quantity
 from diagnosis.model.parameter import FreeParameter
 from diagnosis.model.parameter_text import format_value
 from diagnosis.model.parameter_vector import vector_of
-from diagnosis.pipeline.case import Case, build_model_set, file_digests, read_series
+from diagnosis.pipeline.diagnosis_case import Case, build_model_set, file_digests, read_series
 from diagnosis.selection.candidate_search import LogCallback
 from diagnosis.selection.intersample import best_hold, recalibrate_by_hold
 from diagnosis.validation.free_simulation import compare_misfits

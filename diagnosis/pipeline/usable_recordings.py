@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnosis.pipeline.case import Case
-from diagnosis.quality.finding import Finding, format_findings
-from diagnosis.quality.recording import RecordingCheck
+from diagnosis.data_quality.finding import Finding, format_findings
+from diagnosis.data_quality.recording_check import RecordingCheck
+from diagnosis.pipeline.diagnosis_case import Case
 from engine.recordings.recording import Channel, Recording
 
 

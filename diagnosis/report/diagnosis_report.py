@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from diagnosis.pipeline.case import Case
+from diagnosis.data_quality.finding import Finding, format_findings
+from diagnosis.data_quality.recording_check import RecordingCheck
 from diagnosis.pipeline.diagnose import Diagnosis
+from diagnosis.pipeline.diagnosis_case import Case
 from diagnosis.pipeline.usable_recordings import recording_errors
-from diagnosis.quality.finding import Finding, format_findings
-from diagnosis.quality.recording import RecordingCheck
 from diagnosis.result.verdict import Verdict
 from language.model.automaton import Automaton
 

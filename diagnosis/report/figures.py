@@ -13,11 +13,11 @@ from matplotlib.figure import Figure
 
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.experiment.discrimination import ExperimentPlan
-from diagnosis.localisation.acting_scale import disturbance_unit
 from diagnosis.localisation.cause import balance_of
 from diagnosis.localisation.location import SIGNIFICANT_STDS, DisturbanceEstimate, Location
 from diagnosis.localisation.location_text import PLACE_PHRASES
-from diagnosis.report import sentences
+from diagnosis.localisation.reference_magnitude import disturbance_unit
+from diagnosis.report import report_text as sentences
 from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.model_comparison import ModelComparison
 from diagnosis.report.number_text import format_percent, format_significant
@@ -27,7 +27,7 @@ from diagnosis.validation.whiteness import WhitenessTest
 from diagnosis.validation.worst_window import WorstWindow
 from engine.results.mode_band import PALETTE
 from engine.results.plot import Picture
-from language.overlays.tree_types import format_si_unit
+from language.overlays.name_types import format_si_unit
 from language.text.sanitise import escape_invisible
 
 BLUE, RED, GREEN, _, _, PURPLE, GREY = PALETTE

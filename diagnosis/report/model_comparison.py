@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.estimate import Estimate
-from diagnosis.estimation.per_recording import reestimate_per_recording
+from diagnosis.estimation.per_recording_parameters import reestimate_per_recording
 from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.validation.whiteness import WhitenessTest, innovation_whiteness
 from diagnosis.validation.worst_window import (
@@ -17,7 +17,7 @@ from diagnosis.validation.worst_window import (
     simulate_free_runs,
 )
 from language.loading.recording_map_reader import column_dimension
-from language.overlays.tree_types import format_si_unit
+from language.overlays.name_types import format_si_unit
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.variant_file import missing_effects, variant_name
 from diagnosis.validation.worst_window import WorstWindow
-from language.overlays.tree_types import format_si_unit
+from language.overlays.name_types import format_si_unit
 
 VARIANT = "variant.yaml"
 WINDOW = "window.csv"

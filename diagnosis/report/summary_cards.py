@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from diagnosis.quality.finding import format_findings
-from diagnosis.report import sentences
+from diagnosis.data_quality.finding import format_findings
+from diagnosis.report import report_text as sentences
 from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.number_text import format_change, format_percent, format_probability
 from diagnosis.report.tables import location_rows

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from diagnosis.localisation.location import Location
-from diagnosis.report import sentences
+from diagnosis.report import report_text as sentences
 from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.number_text import (
     format_change,

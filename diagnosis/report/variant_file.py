@@ -11,7 +11,7 @@ from diagnosis.estimation.quantity import Quantity
 from diagnosis.model.parameter_text import format_value
 from diagnosis.model.placed_effect import automaton_with_effects
 from diagnosis.report.diagnosis_report import DiagnosisReport
-from diagnosis.report.sentences import format_two_digits
+from diagnosis.report.report_text import format_two_digits
 from diagnosis.selection.candidate_search import CandidateFit
 from diagnosis.selection.forward_selection import Selection
 from language.model.automaton import Automaton

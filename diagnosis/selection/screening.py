@@ -19,7 +19,7 @@ from diagnosis.estimation.levenberg_marquardt import (
     refresh_gains,
 )
 from diagnosis.estimation.model_set import ModelSet
-from diagnosis.estimation.per_recording import restart_phases
+from diagnosis.estimation.per_recording_parameters import restart_phases
 from diagnosis.model.candidate import Candidate
 from diagnosis.model.parameter_vector import ParameterVector, extend_vector
 from diagnosis.model.placed_effect import PlacedEffect

@@ -16,7 +16,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 from language.model.system import Scenario, Stimulus, System
 
 Reals = NDArray[np.float64]

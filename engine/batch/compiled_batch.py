@@ -14,7 +14,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from engine.batch.batch import Batch, BatchResult
-from engine.batch.compiled_group import CompiledGroup
 from engine.batch.compiled_run import BuildLibrary
 from engine.batch.interpreted_batch import (
     allocate_result,
@@ -30,6 +29,7 @@ from engine.batch.parameter_binding import (
     value_bounds,
 )
 from engine.batch.run_plan import planning_obstacle
+from engine.batch.variant_group import CompiledGroup
 
 MAX_CACHED = 4
 """Number of compiled batches in a cache; a study alternates between its scenarios."""

@@ -12,18 +12,18 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.batch.build_assembly import assembly_of
+from engine.batch.build_system_program import assembly_of
 from engine.batch.run_plan import build_run_plan
 from engine.execution.invariant_monitor import invariant_event
 from engine.execution.range_monitor import format_range_violation, range_event
 from engine.execution.transition_events import mode_names, transition_event
 from engine.results.row_recorder import recorded_columns
-from engine.results.samples import Event
+from engine.results.sampled_run import Event
 from engine.results.trajectory import Trajectory, column_array, fault_names
 from language.ir.number_type import round_to_type
 from language.ir.program import InvariantInfo, Program, unqualified_name
 from language.model.system import Scenario, System
-from language.programs.simulation_assembly import SimulationAssembly, range_event_variables
+from language.programs.system_program import SimulationAssembly, range_event_variables
 
 EVENT_DTYPE = np.dtype(
     [

@@ -21,7 +21,7 @@ from engine.batch.batch import (
 from engine.batch.parameter_binding import ParameterBinding, group_variants
 from engine.interpreter.apply_calibration import DERIVE_BLOCKS
 from engine.interpreter.interpreter import Interpreter, Stepper
-from engine.results.samples import Event
+from engine.results.sampled_run import Event
 from engine.results.trajectory import Trajectory
 from engine.simulation.event_schedule import TimeGrid
 from engine.simulation.simulate import BuildStepper, simulate
@@ -169,14 +169,13 @@ def _simulate_variant(
 ) -> Trajectory:
     """Return the trajectory of a variant with its tunable parameters set."""
     values = tunable_values(batch, binding, variant)
-    owners = {id(program): name for name, program in binding.programs.items()}
 
     def build_tuned(program: Program) -> Stepper:
         stepper = build(program)
         known = {constant.name for constant in program.constants}
         for (owner, parameter), value in values.items():
             name = f"calibration.{parameter}"
-            if owner == owners[id(program)] and name in known:
+            if binding.programs[owner] is program and name in known:
                 kind = next(c.type for c in program.constants if c.name == name)
                 typed = round_to_type(value, program.number_type) if kind == "real" else int(value)
                 stepper.set(name, bool(typed) if kind == "truth" else typed)

@@ -16,14 +16,14 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.batch.build_assembly import assembly_of
+from engine.batch.build_system_program import assembly_of
 from engine.simulation.event_schedule import Schedule, TimeGrid
 from engine.simulation.sensors import noise_stream
 from engine.simulation.signal_values import DelayLine
 from engine.simulation.stimuli import InputSignal
 from language.ir.program import Program
 from language.model.system import Scenario, System
-from language.programs.simulation_assembly import InputTrajectory as Varying, SimulationAssembly
+from language.programs.system_program import InputTrajectory as Varying, SimulationAssembly
 
 Reals = NDArray[np.float64]
 Integers = NDArray[np.int64]

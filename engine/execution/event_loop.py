@@ -15,7 +15,7 @@ from engine.execution.invariant_monitor import InvariantMonitor
 from engine.execution.range_monitor import RangeMonitor
 from engine.execution.transition_events import fired_transitions, transition_event
 from engine.interpreter.interpreter import Stepper
-from engine.results.samples import Event
+from engine.results.sampled_run import Event
 from language.ir.program import Program, TransitionInfo, unqualified_name
 from language.programs.major_step import MAX_EVENTS_PER_STEP
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from fractions import Fraction
 
 from engine.interpreter.interpreter import Stepper
-from engine.results.samples import Event
+from engine.results.sampled_run import Event
 from language.ir.program import InvariantInfo, Program
 
 INVARIANT_BLOCK = "invariants"

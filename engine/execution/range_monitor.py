@@ -8,9 +8,9 @@ from fractions import Fraction
 from operator import le
 
 from engine.interpreter.interpreter import Stepper
-from engine.results.samples import Event
+from engine.results.sampled_run import Event
 from language.ir.program import Program, unqualified_name
-from language.programs.simulation_assembly import RANGE_TOLERANCE
+from language.programs.system_program import RANGE_TOLERANCE
 
 FINITE_RANGE = (-sys.float_info.max, sys.float_info.max)
 """Range of a state without a declared range: all finite numbers."""

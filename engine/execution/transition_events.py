@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from engine.interpreter.interpreter import Stepper
-from engine.results.samples import Event
+from engine.results.sampled_run import Event
 from language.ir.program import LOG_COUNT_VARIABLE, LOG_VARIABLE, Program, TransitionInfo
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 
 
 def fired_transitions(program: Program, stepper: Stepper) -> list[TransitionInfo]:

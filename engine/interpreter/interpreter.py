@@ -6,7 +6,6 @@ The closures are compiled once for each Program and shared by its interpreters.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 from operator import itemgetter
 from typing import Any, Protocol
 
@@ -14,6 +13,7 @@ from engine.interpreter.block_compiler import BlockCompiler
 from engine.interpreter.expression_closures import Frame
 from engine.interpreter.number_arithmetic import ARITHMETIC_OF_TYPE
 from engine.interpreter.value_frame import RANGE_VIOLATIONS
+from language.ir.analysis_cache import cache_on_owner
 from language.ir.program import Program
 
 
@@ -45,7 +45,7 @@ class Interpreter:
         Variables are 0 or false before.
         """
         self.program = program
-        compiler = _compile_program(_ProgramIdentity(program))
+        compiler = _compile_program(program)
         self._slots = compiler.scope.slots
         self._blocks = compiler.blocks
         self._real = compiler.reals
@@ -114,24 +114,8 @@ class Interpreter:
         return lambda: tuple([to_python(frame[slot]) for slot in slots])
 
 
-class _ProgramIdentity:
-    """Cache key of a Program that compares by identity.
-
-    A comparison of contents takes longer than a run.
-    """
-
-    def __init__(self, program: Program) -> None:
-        self.program = program
-
-    def __hash__(self) -> int:
-        return id(self.program)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _ProgramIdentity) and other.program is self.program
-
-
-@lru_cache(maxsize=64)
-def _compile_program(key: _ProgramIdentity) -> BlockCompiler:
+@cache_on_owner
+def _compile_program(program: Program) -> BlockCompiler:
     """Return the closures of a Program; all interpreters of the Program share them."""
-    with ARITHMETIC_OF_TYPE[key.program.number_type].suppress_warnings():
-        return BlockCompiler(key.program)
+    with ARITHMETIC_OF_TYPE[program.number_type].suppress_warnings():
+        return BlockCompiler(program)

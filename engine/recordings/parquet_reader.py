@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from engine.recordings.recording_file import RecordedFile, Samples, require_size, unreadable_error
-from engine.results.parquet import import_pyarrow
+from engine.results.pyarrow_import import import_pyarrow
 from language.overlays.expand_document import display_path
 from language.text.diagnostic import Source, Span
 

@@ -19,7 +19,7 @@ from scipy.integrate import solve_ivp
 from engine.execution.event_loop import SimulationStopped
 from engine.interpreter.interpreter import Interpreter
 from language.ir.program import ModeInfo, Program, unqualified_name
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 
 ScipyMethod = Literal["DOP853", "Radau", "LSODA"]
 """Methods of scipy.

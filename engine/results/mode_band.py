@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.patches import Patch
 
-from engine.results.samples import SampledRun, SignalArray
+from engine.results.sampled_run import SampledRun, SignalArray
 from language.lowering.program_builder import INACTIVE
 
 PALETTE = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#777777")

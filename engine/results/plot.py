@@ -14,8 +14,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from engine.results.mode_band import PALETTE, ModeBand, draw_band, label_segments
-from engine.results.samples import SampledRun
-from language.reading.mode_reader import IMPLICIT_MODE
+from engine.results.sampled_run import SampledRun
+from language.readers.mode_reader import IMPLICIT_MODE
 from language.text.diagnostic import suggest_name
 from language.text.sanitise import escape_invisible
 

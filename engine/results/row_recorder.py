@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.results.samples import SignalArray as Column
+from engine.results.sampled_run import SignalArray as Column
 from engine.results.trajectory import column_array
 from language.expressions.units import display_unit
 from language.ir.program import Program, ValueType

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.results.samples import Event, SignalArray
+from engine.results.sampled_run import Event, SignalArray
 from engine.results.trajectory import Trajectory
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 
 Reals = NDArray[np.float64]
 

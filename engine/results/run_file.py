@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from engine.results.parquet import import_pyarrow
-from engine.results.samples import Event, SignalArray
+from engine.results.pyarrow_import import import_pyarrow
+from engine.results.sampled_run import Event, SignalArray
 from engine.results.trajectory import TIME_HEADER, Trajectory, column_headers
 from language.overlays.expand_document import display_path
 from language.text.diagnostic import Problems, Source, Span, SpecError

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.results.samples import Event, SignalArray
+from engine.results.sampled_run import Event, SignalArray
 from language.ir.program import Program
 from language.text.diagnostic import MissingToolError
 

@@ -18,12 +18,12 @@ import numpy as np
 from engine.execution.transition_events import fired_by_micro_step, mode_names, transition_event
 from engine.interpreter.interpreter import Interpreter, Stepper
 from engine.recordings.recording import Channel, Recording
-from engine.results.samples import Event, SignalArray
+from engine.results.sampled_run import Event, SignalArray
 from engine.results.trajectory import Trajectory, column_array, fault_names
 from language.expressions.units import display_unit
 from language.ir.program import Program
-from language.ir.regions import CHART
-from language.loading.map_pairing import pair_columns
+from language.ir.root_region import CHART
+from language.loading.recording_map_columns import pair_columns
 from language.model.automaton import Automaton
 from language.model.system import RecordingMap
 from language.text.diagnostic import Problems, SpecError

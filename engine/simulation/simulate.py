@@ -19,10 +19,10 @@ from engine.execution.transition_events import fired_by_micro_step, mode_names, 
 from engine.interpreter.apply_calibration import calibrate
 from engine.interpreter.interpreter import Interpreter, Stepper
 from engine.results.row_recorder import RowRecorder, recorded_columns
-from engine.results.samples import Event
+from engine.results.sampled_run import Event
 from engine.results.trajectory import Trajectory, fault_names
 from engine.simulation.event_schedule import Schedule
-from engine.simulation.input_wiring import InputWiring, describe_instant
+from engine.simulation.input_connections import InputWiring, describe_instant
 from engine.simulation.instance_programs import programs_of
 from engine.simulation.signal_values import Signals
 from engine.simulation.stimuli import resolve_recording

@@ -13,7 +13,7 @@ from language.charts.chart_context import NEVER_LEFT, ChartContext, entry_flag, 
 from language.ir.ops import Assign, Block, Branch, Compare, Op, Switch, Value, integer
 from language.ir.program import mode_variable
 from language.lowering.edge_detection import start_timers
-from language.lowering.transition_infos import start_run
+from language.lowering.transition_metadata import start_run
 from language.model.automaton import Transition
 from language.model.statechart import ChartNode, ChartTransition, HistoryKind
 

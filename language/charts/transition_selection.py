@@ -36,7 +36,7 @@ from language.ir.ops import (
     integer,
 )
 from language.ir.program import Variable, mode_variable
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 from language.lowering.chart_activity import is_complete
 from language.lowering.edge_detection import (
     detect_edges,
@@ -47,7 +47,7 @@ from language.lowering.event_queue import event_condition
 from language.lowering.expressions import lower_expression
 from language.lowering.fault_mode import FAULT_PRIORITY
 from language.lowering.range_saturation import FAULT_HAPPENED
-from language.lowering.transition_infos import wait_ticks
+from language.lowering.transition_metadata import wait_ticks
 from language.model.automaton import Mode, Transition
 from language.model.region_queries import transitions_by_priority
 from language.model.statechart import ChartNode

@@ -10,7 +10,7 @@ from language.checks.check_single_writer import check_memory_continue
 from language.expressions.name_rules import NAME_PATTERN
 from language.expressions.syntax_tree import EDGE_FUNCTIONS, MEMORY_FUNCTIONS, TIME_FUNCTIONS, names
 from language.expressions.units import SECOND
-from language.lowering.parameter_bindings import parameter_kinds
+from language.lowering.program_parameters import parameter_kinds
 from language.lowering.wait_ticks import tunable_wait
 from language.model.automaton import Automaton, Mode, Transition
 from language.model.declaration import Formula

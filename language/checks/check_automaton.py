@@ -14,13 +14,13 @@ from language.checks.check_chart import check_chart
 from language.checks.check_domain import check_domains
 from language.checks.check_guard_overlap import check_guard_overlap
 from language.checks.check_instant_cycles import check_short_cycles
-from language.checks.check_memory import check_memory
 from language.checks.check_number_range import check_ranges
 from language.checks.check_observer import check_observer
 from language.checks.check_reachability import check_reachability
 from language.checks.check_region import check_regions
 from language.checks.check_rewind import check_rewind_depth
 from language.checks.check_single_writer import check_outputs, check_scaling_ranges, check_writers
+from language.checks.check_stateful_functions import check_memory
 from language.checks.check_truth_table import check_truth_tables
 from language.checks.check_unused import check_unused
 from language.checks.declared_names import collect_declared_names
@@ -35,7 +35,7 @@ from language.expressions.units import (
     dimension_product,
     display_unit,
 )
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 from language.lowering.wait_ticks import check_tunable_waits
 from language.model.automaton import Automaton, Mode
 from language.model.chart_paths import mode_paths
@@ -44,9 +44,9 @@ from language.model.evaluation_order import equation_order, report_cycle
 from language.model.region_queries import attach_regions, equation_formulas
 from language.smt.query_engine import QueryEngine
 from language.text.diagnostic import Problems, SpecError, suggest_name
-from language.typecheck.environment import NameEnvironment
 from language.typecheck.infer import TypeChecker
 from language.typecheck.lookup_table import LookupTable
+from language.typecheck.name_environment import NameEnvironment
 from language.typecheck.types import EnumType, ExprType, IntType
 
 

@@ -16,8 +16,8 @@ from language.lowering.constants import evaluate_exactly
 from language.model.automaton import Automaton, Transition
 from language.model.statechart import ROOT, Chart, ChartNode
 from language.model.transition_precedence import node_of
-from language.smt.guard_snapshot import TIME_IN_MODE, GuardSnapshot, SymbolicPath
 from language.smt.query_engine import QueryEngine, Witness
+from language.smt.symbolic_environment import TIME_IN_MODE, GuardSnapshot, SymbolicPath
 from language.text.diagnostic import Problems, SpecError
 
 CHANGED_PREFIX = "memory.changed"

@@ -22,9 +22,9 @@ from language.model.transition_precedence import (
     possible_events,
     preceding_transitions,
 )
-from language.reading.transition_table_reader import STAY
-from language.smt.guard_snapshot import TIME_IN_MODE, GuardSnapshot
+from language.readers.transition_table_reader import STAY
 from language.smt.query_engine import QueryEngine
+from language.smt.symbolic_environment import TIME_IN_MODE, GuardSnapshot
 from language.text.diagnostic import Problems, Span, SpecError
 
 PRIORITY_HINT = "give it a smaller priority, or "

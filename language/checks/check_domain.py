@@ -11,17 +11,17 @@ from contextlib import suppress
 from typing import Literal
 
 from language.expressions.balance_form import coefficient_of
-from language.expressions.syntax_tree import SyntaxTree, TreeNumbering
+from language.expressions.syntax_tree import SyntaxTree
 from language.ir.ops import Compare, Unary, real
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 from language.lowering.delay_buffers import action_formulas
-from language.lowering.parameter_bindings import parameter_order
+from language.lowering.program_parameters import parameter_order
 from language.model.automaton import Automaton, Mode
 from language.model.evaluation_order import equation_order
 from language.model.region_queries import equation_formulas
 from language.model.truth_table import truth_table_formulas
-from language.smt.guard_snapshot import GuardSnapshot
 from language.smt.query_engine import QueryEngine
+from language.smt.symbolic_environment import GuardSnapshot
 from language.text.diagnostic import Problems, SpecError
 from language.typecheck.interval import UNBOUNDED, Interval
 from language.typecheck.range_analysis import RangeAnalysis
@@ -62,9 +62,8 @@ def check_domains(automaton: Automaton, problems: Problems) -> None:
     warning.
     """
     fixed: dict[str, Interval] = {}
-    likeness = TreeNumbering()
     for mode in automaton.all_modes:
-        domains = _ModeDomainChecker(automaton, mode, problems, fixed, likeness)
+        domains = _ModeDomainChecker(automaton, mode, problems, fixed)
         if not fixed:
             fixed.update({name: domains.interval_of(name) for name in parameter_order(automaton)})
         domains.check()
@@ -81,16 +80,13 @@ class _ModeDomainChecker:
         mode: Mode,
         problems: Problems,
         fixed: Mapping[str, Interval],
-        likeness: TreeNumbering,
     ) -> None:
         self.automaton = automaton
         self.mode = mode
         self.problems = problems
         self.formulas = equation_formulas(mode)
         self.intervals: dict[str, Interval] = dict(fixed)
-        self.range_analysis = RangeAnalysis(
-            self.interval_of, self._table_interval, likeness, self._report
-        )
+        self.range_analysis = RangeAnalysis(self.interval_of, self._table_interval, self._report)
         self.unreported_range_analysis = self.range_analysis.without_reports
 
     def check(self) -> None:

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from language.expressions.syntax_tree import Not, Relation, SyntaxTree, is_same_expression
+from language.expressions.syntax_tree import Not, Relation, SyntaxTree
 from language.model.automaton import Automaton, Mode, Transition
-from language.smt.guard_snapshot import GuardSnapshot
 from language.smt.query import SolverQuery
 from language.smt.query_engine import QueryEngine, Witness
+from language.smt.symbolic_environment import GuardSnapshot
 from language.text.diagnostic import Problems, SpecError
 
 EXCLUSIVE_RELATIONS = {"<": (">", ">="), "<=": (">",), ">": ("<", "<="), ">=": ("<",)}
@@ -65,17 +65,13 @@ def are_syntactically_exclusive(left: SyntaxTree, right: SyntaxTree) -> bool:
     sides in the same order, like `a < b` and `a >= b`. `b > a` and a relation inside an `and` are
     not recognised.
     """
-    if isinstance(right, Not) and is_same_expression(right.operand, left):
+    if isinstance(right, Not) and right.operand == left:
         return True
-    if isinstance(left, Not) and is_same_expression(left.operand, right):
+    if isinstance(left, Not) and left.operand == right:
         return True
     if isinstance(left, Relation) and isinstance(right, Relation):
         opposed = right.operator in EXCLUSIVE_RELATIONS.get(left.operator, ())
-        return (
-            opposed
-            and is_same_expression(left.left, right.left)
-            and is_same_expression(left.right, right.right)
-        )
+        return opposed and left.left == right.left and left.right == right.right
     return False
 
 

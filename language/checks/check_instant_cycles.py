@@ -12,14 +12,14 @@ from contextlib import suppress
 from itertools import islice
 
 from language.expressions.syntax_tree import Name, Relation, SyntaxTree, walk
+from language.ir.analysis_cache import cache_on_owner
 from language.ir.ops import Expr, Unary
 from language.lowering.constants import evaluate_exactly
-from language.model.analysis_cache import cache_on_owner
 from language.model.automaton import Automaton, Mode, Transition
-from language.model.graphs import strongly_connected_components
-from language.smt.guard_snapshot import GuardSnapshot, SymbolicPath
-from language.smt.linear_bounds import is_disproved_by_bounds
+from language.model.graph_algorithms import strongly_connected_components
+from language.smt.bound_propagation import is_disproved_by_bounds
 from language.smt.query_engine import QueryEngine, Witness
+from language.smt.symbolic_environment import GuardSnapshot, SymbolicPath
 from language.text.diagnostic import Problems, SpecError
 
 MAX_CYCLE_LENGTH = 4

@@ -15,8 +15,8 @@ from language.ir.ops import Binary, Compare, Expr, real
 from language.lowering.expressions import WHOLE_TYPES, lower_assigned_value
 from language.model.automaton import Automaton, Mode
 from language.model.declaration import Formula, RangePolicy, State
-from language.smt.guard_snapshot import GuardSnapshot
 from language.smt.query_engine import QueryEngine, Witness
+from language.smt.symbolic_environment import GuardSnapshot
 from language.text.diagnostic import Problems, SpecError
 
 STATE_PREFIXES = ("state.", "discrete.", "memory.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from language.model.automaton import Automaton, Mode
-from language.model.names_read import names_read_by
+from language.model.used_names import names_read_by
 from language.text.diagnostic import Problems, suggest_name
 
 UNUSED_HINT = "make it an output, or remove it"

@@ -13,10 +13,10 @@ from language.checks.check_instant_cycles import Cycle, instant_transitions
 from language.expressions.syntax_tree import NEGATED_RELATION, FunctionCall, walk
 from language.ir.ops import Binary, Call, Compare, Expr, Ref, Unary, Value, multiply, real, subtract
 from language.model.automaton import Automaton, Transition
-from language.smt.guard_snapshot import GuardSnapshot, SymbolicPath
 from language.smt.lie_derivative import LieDerivative, UnknownRateError
 from language.smt.query import SolverQuery
 from language.smt.query_engine import QueryEngine, Witness
+from language.smt.symbolic_environment import GuardSnapshot, SymbolicPath
 from language.text.diagnostic import Problems, SpecError
 
 TIMED_FUNCTIONS = ("after", "every", "rising", "falling", "changed", "delay")

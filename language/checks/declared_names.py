@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from language.checks.check_single_writer import equation_names_of
-from language.expressions.name_rules import report_case_collisions
+from language.expressions.name_rules import check_variable_name, report_case_collisions
 from language.model.automaton import Automaton
 from language.model.declaration import Input, Parameter, State
 from language.model.system import SystemInput
@@ -43,8 +43,8 @@ def collect_declared_names(
 
     Names are parameters, inputs, states and discrete variables; the first result also has the
     values. Reported are names that are declared twice (also as an equation or region),
-    BUILTIN_NAMES, names that differ in case only, and values that two enumerations with different
-    lists share.
+    BUILTIN_NAMES, words of the C library (also as an equation or output), names that differ in case
+    only, and values that two enumerations with different lists share.
     """
     table = _DeclarationTable(automaton, problems)
     table.declare()
@@ -72,11 +72,16 @@ class _DeclarationTable:
             for thing in group.values():
                 if thing.values:
                     self._declare_literals(thing)
-        for name in equation_names_of(automaton.all_modes):
+        equations = equation_names_of(automaton.all_modes)
+        for name in equations:
             for mode in automaton.all_modes:
                 if name in mode.equations:
                     self._report_clash(name, mode.equations[name].span)
+                    check_variable_name(name, mode.equations[name].span, self.problems)
                     break
+        for name, span in automaton.outputs.items():
+            if name not in self.first_spans and name not in equations:
+                check_variable_name(name, span, self.problems)
         for region in automaton.regions:
             self._report_clash(region.name, region.span)
         self._report_case_collisions()
@@ -93,6 +98,7 @@ class _DeclarationTable:
     def _declare_name(self, name: str, kind: ExprType, span: Span) -> None:
         """Add a name with its type; report it if it exists already."""
         self._report_clash(name, span)
+        check_variable_name(name, span, self.problems)
         self.kinds[name] = kind
         self.first_spans.setdefault(name, span)
 

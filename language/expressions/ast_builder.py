@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from language.expressions.number_literal import parse_number_literal, parse_quantity_literal
+from language.expressions.parse_tree import ParsedShape, ParseShape
 from language.expressions.syntax_tree import (
     Arithmetic,
     BoolLiteral,
@@ -20,7 +21,6 @@ from language.expressions.syntax_tree import (
     Relation,
     SyntaxTree,
 )
-from language.expressions.token_shape import ParsedShape, ParseShape
 from language.text.diagnostic import Problems, Span, SpecError
 
 MAX_POWER = 8

@@ -84,8 +84,8 @@ def key_alias_hint(word: str, known_keys: Collection[str]) -> str:
 def key_hint(key: str, what: str) -> str:
     """Return the help text for a key that is not allowed at `what`, the key path; empty if unknown.
 
-    Known are `on x` and `on_x` at any place, `priority` of a region at the root, and the keys of
-    KEY_HINTS below `modes.` or `regions.`.
+    Known are `on x` and `on_x` at any place, `priority` of a region at the root, `range` of an
+    input of a system or a scenario, and the keys of KEY_HINTS below `modes.` or `regions.`.
     """
     event_key = re.fullmatch(r"on[ _](\w+)", key)
     if event_key:
@@ -95,6 +95,8 @@ def key_hint(key: str, what: str) -> str:
         )
     if key == "priority" and re.fullmatch(r"regions\.\w+", what):
         return "regions at the root are never left: those inside a mode have a priority"
+    if key == "range" and re.fullmatch(r"inputs\.\w+", what):
+        return "the range belongs to the input of the automaton that reads it"
     return KEY_HINTS.get(key, "") if re.match(r"(.*\.)?(modes|regions)\.", what) else ""
 
 

@@ -16,7 +16,12 @@ C_MACRO_PATTERN = re.compile(
 )
 """Macros of the headers that generated code includes."""
 
-FILE_WORDS = frozenset({"main", "ha_math", "float", "math", "stdint", "stdbool", "string"})
+C_HEADERS = """
+assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdalign
+stdarg stdatomic stdbool stddef stdint stdio stdlib stdnoreturn string tgmath threads time uchar
+wchar wctype"""
+"""Headers of the C library (ISO/IEC 9899:2011, 7.1.2), without their suffix."""
+FILE_WORDS = frozenset({"main", "ha_math", *C_HEADERS.split()})
 """File names that the files of an automaton would collide with."""
 
 DEVICE_NAME_PATTERN = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)
@@ -25,7 +30,7 @@ DEVICE_NAME_PATTERN = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE
 
 @cache
 def reserved_words() -> Mapping[str, frozenset[str]]:
-    """Return the reserved words by section: GRAMMAR, YAML, C, C++, A2L, GENERATED.
+    """Return the reserved words by section: GRAMMAR, YAML, C, C++, C library, A2L, GENERATED.
 
     They are read from the file reserved.txt once.
     """
@@ -47,7 +52,8 @@ def check_name(name: str, span: Span, problems: Problems) -> None:
 
     The form is that of NAME_PATTERN: a letter, then at most 30 letters, digits or `_`. Reserved are
     the words of `reserved_words`, those of YAML in any case, and the macros of C_MACRO_PATTERN
-    (docs/language.md, "Names, numbers, units").
+    (docs/language.md, "Names, numbers, units"). Words of the C library are not reported: they are
+    reserved for variables only (`check_variable_name`).
     """
     words = reserved_words()
     another = f"another name, like `{name}_1`"
@@ -71,6 +77,18 @@ def check_name(name: str, span: Span, problems: Problems) -> None:
                 return
 
 
+def check_variable_name(name: str, span: Span, problems: Problems) -> None:
+    """Report the name of a variable that is a word of the C library, as "name" at `span`.
+
+    In generated C the names of variables are identifiers of their own; those of modes, transitions,
+    events and regions are parts of longer ones, and may be words of the library. The form and the
+    other words are those of `check_name`, which is called where the name is read.
+    """
+    if name in reserved_words()["C library"]:
+        label = f"`{name}` is a word of the C library, and generated files keep the names"
+        problems.error("name", span, label, f"another name, like `{name}_1`")
+
+
 def check_region_name(name: str, span: Span, problems: Problems) -> None:
     """Report a wrong name of a region or an instance, by the rules of `check_name`.
 
@@ -83,8 +101,8 @@ def check_region_name(name: str, span: Span, problems: Problems) -> None:
 def check_file_name(name: str, span: Span, problems: Problems) -> None:
     """Report a wrong name of an automaton, also one that cannot be the name of its files.
 
-    The rules are those of `check_name`; in addition, FILE_WORDS and device names of Windows are
-    reported in any case.
+    The rules are those of `check_name`; in addition, FILE_WORDS (among them the headers of the C
+    library) and device names of Windows are reported in any case.
     """
     check_name(name, span, problems)
     if name.lower() in FILE_WORDS or DEVICE_NAME_PATTERN.fullmatch(name):

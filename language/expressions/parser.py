@@ -18,8 +18,8 @@ from language.expressions.number_literal import (
     parse_number_literal,
     parse_quantity_literal,
 )
+from language.expressions.parse_tree import parse_shape
 from language.expressions.syntax_tree import Name, SyntaxTree, depth
-from language.expressions.token_shape import parse_shape
 from language.expressions.tokens import KEYWORDS
 from language.text.diagnostic import Problems, Span, SpecError
 from language.text.document import ScalarNode

@@ -21,7 +21,6 @@ from language.expressions.syntax_tree import (
     Power,
     Relation,
     SyntaxTree,
-    is_same_expression,
 )
 from language.expressions.units import NO_UNIT
 from language.text.diagnostic import Span
@@ -59,7 +58,7 @@ def subtract(a: SyntaxTree, b: SyntaxTree) -> SyntaxTree:
         return negate(b)
     if isinstance(a, NumberLiteral) and isinstance(b, NumberLiteral):
         return make_number(a.value - b.value, a.span)
-    if is_same_expression(a, b):
+    if a == b:
         return make_number(0, a.span)
     if isinstance(b, Negation):
         return add(a, b.operand)

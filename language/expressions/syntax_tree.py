@@ -1,10 +1,13 @@
-"""Syntax tree: the nodes of an expression, each with its span, and functions on trees."""
+"""Syntax tree: the nodes of an expression, each with its span, and functions on trees.
+
+Spans are no part of a comparison: two trees are equal if they are written alike. Literals of equal
+value in different units differ, and so do `a + b` and `b + a`.
+"""
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
@@ -21,7 +24,7 @@ class NumberLiteral:
 
     value: Fraction
     unit: Unit
-    span: Span
+    span: Span = field(compare=False, repr=False)
 
     @property
     def is_bare_zero(self) -> bool:
@@ -34,7 +37,7 @@ class BoolLiteral:
     """`true` or `false`."""
 
     value: bool
-    span: Span
+    span: Span = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +45,7 @@ class Name:
     """A name or a dotted path."""
 
     path: str
-    span: Span
+    span: Span = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +53,7 @@ class Negation:
     """Unary minus."""
 
     operand: SyntaxTree
-    span: Span
+    span: Span = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +61,7 @@ class Not:
     """Logical negation."""
 
     operand: SyntaxTree
-    span: Span
+    span: Span = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +71,7 @@ class Arithmetic:
     operator: str
     left: SyntaxTree
     right: SyntaxTree
-    span: Span
+    span: Span = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +81,7 @@ class Logic:
     operator: str
     left: SyntaxTree
     right: SyntaxTree
-    span: Span
+    span: Span = field(compare=False, repr=False)
 
 
 NEGATED_RELATION = {"<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "=="}
@@ -94,7 +97,7 @@ class Relation:
     operator: str
     left: SyntaxTree
     right: SyntaxTree
-    span: Span
+    span: Span = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +106,7 @@ class Power:
 
     base: SyntaxTree
     exponent: int
-    span: Span
+    span: Span = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +116,7 @@ class Conditional:
     condition: SyntaxTree
     then: SyntaxTree
     other: SyntaxTree
-    span: Span
+    span: Span = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,14 +125,14 @@ class FunctionCall:
 
     function: str
     arguments: tuple[SyntaxTree, ...]
-    span: Span
+    span: Span = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
 class ErrorNode:
     """An expression that could not be parsed; its problem has been reported."""
 
-    span: Span
+    span: Span = field(compare=False, repr=False)
 
 
 SyntaxTree = (
@@ -158,9 +161,9 @@ MEMORY_FUNCTIONS = (*DELAY_FUNCTIONS, *EDGE_FUNCTIONS, *TIME_FUNCTIONS)
 def memory_key(tree: FunctionCall) -> str:
     """Return the key of a call of a function with memory; calls that are written alike share it.
 
-    It is the function, a blank and the text of `structural_key` of its arguments.
+    It is the function, a blank and the text of its arguments without spans.
     """
-    return f"{tree.function} {structural_key(tree.arguments)}"
+    return f"{tree.function} {tree.arguments!r}"
 
 
 def names(tree: SyntaxTree) -> list[Name]:
@@ -219,82 +222,6 @@ def integer_literal(tree: SyntaxTree) -> int | None:
             return None if number is None else -number
         case _:
             return None
-
-
-def structural_key(part: object) -> object:
-    """Return a hashable form of a tree without spans; equal for trees that are written alike.
-
-    It is a tuple of the class name and the forms of the fields. A tuple of trees gives the tuple of
-    their forms, any other value itself. Literals of equal value in different units differ.
-    """
-    if isinstance(part, tuple):
-        return tuple(structural_key(item) for item in part)
-    if dataclasses.is_dataclass(part):
-        field_names = [item.name for item in dataclasses.fields(part) if item.name != "span"]
-        return (type(part).__name__, *(structural_key(getattr(part, name)) for name in field_names))
-    return part
-
-
-def is_same_expression(first: SyntaxTree, second: SyntaxTree) -> bool:
-    """Return whether two trees are equal except for their spans.
-
-    Literals are equal if value and text of the unit are; `a + b` and `b + a` differ.
-    """
-    stack = [(first, second)]
-    while stack:
-        a, b = stack.pop()
-        if a is b:
-            continue
-        parts, others = children(a), children(b)
-        if type(a) is not type(b) or node_label(a) != node_label(b) or len(parts) != len(others):
-            return False
-        stack += zip(parts, others, strict=True)
-    return True
-
-
-def node_label(tree: SyntaxTree) -> object:
-    """Return the content of the root of a tree without its parts.
-
-    It is the path of a name, the value of a truth value, (numerator, denominator, text of the unit)
-    of a number, the operator of a binary operation, the exponent of a power, the function of a
-    call; else None.
-    """
-    match tree:
-        case NumberLiteral(value, unit, _):
-            return (value.numerator, value.denominator, unit.text)
-        case BoolLiteral(value, _):
-            return value
-        case Name(path, _):
-            return path
-        case Arithmetic(operator, _, _, _) | Logic(operator, _, _, _) | Relation(operator, _, _, _):
-            return operator
-        case Power(_, exponent, _):
-            return exponent
-        case FunctionCall(function, _, _):
-            return function
-        case _:
-            return None
-
-
-class TreeNumbering:
-    """A numbering of trees in which trees that are equal except for their spans have one number.
-
-    Trees seen before are found by identity.
-    """
-
-    def __init__(self) -> None:
-        """Create an empty numbering."""
-        self.numbers_by_key: dict[object, int] = {}
-        self.numbered_trees: dict[int, tuple[SyntaxTree, int]] = {}
-
-    def number_of(self, tree: SyntaxTree) -> int:
-        """Return the number of a tree; a new tree gets the next number, from 0, after its parts."""
-        found = self.numbered_trees.get(id(tree))
-        if found is None:
-            key = (type(tree), node_label(tree), *map(self.number_of, children(tree)))
-            found = tree, self.numbers_by_key.setdefault(key, len(self.numbers_by_key))
-            self.numbered_trees[id(tree)] = found
-        return found[1]
 
 
 def depth(tree: SyntaxTree) -> int:

@@ -19,7 +19,7 @@ from language.ir.program import IntegrationInfo, StabilityLimit
 from language.ir.round_literals import round_block
 from language.lowering.constants import derive_block
 from language.lowering.linearisation import LinearisationPoint
-from language.lowering.parameter_bindings import tunables_of
+from language.lowering.program_parameters import tunables_of
 from language.model.automaton import Automaton
 from language.model.declaration import Formula
 from language.numerics.affine_form import affine_forms

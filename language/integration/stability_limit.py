@@ -14,7 +14,7 @@ from functools import cache
 
 from language.integration.rate_terms import steepest_term
 from language.integration.vector_field import VectorField
-from language.model.graphs import strongly_connected_components
+from language.model.graph_algorithms import strongly_connected_components
 from language.numerics.affine_form import AffineForm, coefficient_matrix
 from language.numerics.eigenvalues import dominant_entry, eigenvalues
 from language.text.diagnostic import Problems, Span

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from language.expressions.units import rate_dimension
+from language.ir.analysis_cache import cache_on_owner
 from language.ir.ops import (
     Assign,
     Binary,
@@ -34,7 +35,7 @@ from language.lowering.action_stages import (
     read_stage,
     storage_of,
 )
-from language.lowering.continuous_edges import level_change_conditions, set_levels
+from language.lowering.continuous_edge_detection import level_change_conditions, set_levels
 from language.lowering.expressions import (
     NameBindings,
     choose_by_mode,
@@ -46,7 +47,6 @@ from language.lowering.expressions import (
 )
 from language.lowering.guard_slots import all_guard_slots, guard_slot, guard_slots, mode_bindings
 from language.lowering.program_builder import equation_variables
-from language.model.analysis_cache import cache_on_owner
 from language.model.automaton import Automaton, Balance, Mode, Transition
 from language.model.declaration import Formula
 from language.model.region_queries import (

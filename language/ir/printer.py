@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections import OrderedDict
 from collections.abc import Iterator
 
+from language.ir.analysis_cache import cache_on_owner
 from language.ir.ops import (
     Assign,
     Binary,
@@ -30,14 +30,6 @@ from language.ir.ops import (
 from language.ir.program import Program
 
 INDENT = "    "
-MAX_CACHED_DIGESTS = 16
-"""Number of Programs whose digests are cached."""
-
-_digest_cache: OrderedDict[int, tuple[Program, str]] = OrderedDict()
-"""Digest by identity of a Program.
-
-An entry holds its Program, so that the identity stays unique.
-"""
 
 
 def format_program(program: Program) -> str:
@@ -50,20 +42,9 @@ def format_program(program: Program) -> str:
     return "\n".join(_program_lines(program)) + "\n"
 
 
+@cache_on_owner
 def digest(program: Program) -> str:
-    """Return the first 16 hexadecimal digits of the SHA-256 of `format_program`.
-
-    The digests of the last MAX_CACHED_DIGESTS Programs are cached by identity.
-    """
-    cached = _digest_cache.pop(id(program), None) or (program, _compute_digest(program))
-    _digest_cache[id(program)] = cached
-    if len(_digest_cache) > MAX_CACHED_DIGESTS:
-        _digest_cache.popitem(last=False)
-    return cached[1]
-
-
-def _compute_digest(program: Program) -> str:
-    """Return the digest of a Program without the cache."""
+    """Return the first 16 hexadecimal digits of the SHA-256 of `format_program`."""
     return hashlib.sha256(format_program(program).encode()).hexdigest()[:16]
 
 

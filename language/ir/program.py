@@ -22,8 +22,10 @@ from typing import Literal
 
 from language.ir.number_type import NumberType
 from language.ir.ops import Block
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 
+ENTRY_BLOCKS = ("init", "derive", "step")
+"""The blocks at which generated C enters a Program."""
 MODE_VARIABLE = "memory.mode"
 """Variable of the chart's mode; a run of a model has its own."""
 LOG_VARIABLE = "memory.log"

@@ -146,6 +146,11 @@ def names_used(blocks: Iterable[Block]) -> set[str]:
     return {name for block in blocks for name in block_names(block)}
 
 
+def called_blocks(block: Block) -> list[str]:
+    """Return the names of the blocks that a block runs directly, in its order, with repetitions."""
+    return [op.block for op in walk_ops(block) if isinstance(op, RunBlock)]
+
+
 def reachable_blocks(name: str, blocks: Mapping[str, Block]) -> set[str]:
     """Return the name of a block and the names of all blocks that it runs, even indirectly.
 
@@ -156,7 +161,7 @@ def reachable_blocks(name: str, blocks: Mapping[str, Block]) -> set[str]:
         block_name = stack.pop()
         if block_name not in result:
             result.add(block_name)
-            stack += [op.block for op in walk_ops(blocks[block_name]) if isinstance(op, RunBlock)]
+            stack += called_blocks(blocks[block_name])
     return result
 
 

@@ -13,22 +13,22 @@ from typing import cast
 from language.expressions.name_rules import check_file_name
 from language.expressions.units import SECOND, UNKNOWN_UNIT, are_compatible
 from language.ir.number_type import NUMBER_TYPES, NumberType
-from language.loading.instances import expand_instances
+from language.loading.instance_expansion import expand_instances
 from language.lowering.event_queue import event_inputs
 from language.model.automaton import Automaton
 from language.model.chart_paths import fault_modes
 from language.model.region_queries import attach_regions
 from language.overlays.expand_document import Project, expand_document
 from language.overlays.parameter_override import override_parameter
-from language.reading.chart_reader import CHART_KEYS, ChartReader, ModeStructure, is_chart
-from language.reading.element_reader import ElementReader
-from language.reading.mode_reader import ModeReader
-from language.reading.observer_reader import METHODS
-from language.reading.parameter_reader import ParameterReader
-from language.reading.reader import Reader
-from language.reading.transition_table_reader import expand_transition_tables
-from language.reading.truth_table_reader import TruthTableReader
-from language.reading.variable_reader import VariableReader
+from language.readers.base_reader import Reader
+from language.readers.chart_reader import CHART_KEYS, ChartReader, ModeStructure, is_chart
+from language.readers.element_reader import ElementReader
+from language.readers.mode_reader import ModeReader
+from language.readers.observer_reader import METHODS
+from language.readers.parameter_reader import ParameterReader
+from language.readers.transition_table_reader import expand_transition_tables
+from language.readers.truth_table_reader import TruthTableReader
+from language.readers.variable_reader import VariableReader
 from language.text.diagnostic import Problems, suggest_name
 from language.text.document import Document, Entry, MappingNode, ScalarNode, YamlNode, require_kind
 from language.text.overlay import apply_overlay, without_keys

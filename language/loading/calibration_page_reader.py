@@ -73,17 +73,16 @@ class _PageReader(StimulusReader):
         """Return the pages in the order of the file; times that do not ascend are reported."""
         pages: list[ScheduledCalibration] = []
         for entry in self.read_mapping(node, "pages"):
-            error_count = len(self.problems.reported)
-            time = self.read_time(
+            time = self.read_valid_time(
                 ScalarNode(entry.key, entry.span), "the time of a page", entry.span
             )
-            is_time = len(self.problems.reported) == error_count
-            if is_time and pages and time <= pages[-1].time:
+            if time is not None and pages and time <= pages[-1].time:
                 self.problems.error("order", entry.span, "pages are in the order of time")
             values: dict[tuple[str, str], Fraction] = {}
             for item in self.read_mapping(entry.node, f"pages.{entry.key}"):
                 values.update(self._read_values(item))
-            pages.append(ScheduledCalibration(time, values))
+            if time is not None:
+                pages.append(ScheduledCalibration(time, values))
         return tuple(pages)
 
     def _read_values(self, entry: Entry) -> Mapping[tuple[str, str], Fraction]:

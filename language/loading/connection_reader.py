@@ -21,12 +21,12 @@ from language.expressions.syntax_tree import (
 from language.expressions.units import PURE_NUMBER, SECOND, Dimension, Unit, are_compatible
 from language.model.declaration import Formula
 from language.model.system import Connection, DelayedSignal, Instance, Sensor, SystemInput
-from language.reading.difference_literal import read_difference
-from language.reading.reader import Reader
+from language.readers.base_reader import Reader
+from language.readers.difference_literal import read_difference
 from language.text.diagnostic import Problems, Span, suggest_name
 from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
-from language.typecheck.environment import NameEnvironment
 from language.typecheck.infer import TypeChecker
+from language.typecheck.name_environment import NameEnvironment
 from language.typecheck.types import ExprType, IntType
 
 SENSOR_KEYS = ("of", "filter", "delay", "noise", "quantise", "sample")

@@ -17,7 +17,7 @@ from language.expressions.units import (
 )
 from language.model.system import ALL_FILES, ColumnMapping, RecordingMap, Window
 from language.overlays.expand_document import Project, expand_document
-from language.reading.reader import Reader
+from language.readers.base_reader import Reader
 from language.text.diagnostic import Problems, Span
 from language.text.document import (
     Document,

@@ -90,7 +90,7 @@ class _ScenarioReader(StimulusReader):
         """Return the horizon [s]; None for `horizon: recording`."""
         node = tree.get("horizon")
         if isinstance(node, ScalarNode) and node.text == "recording":
-            if self.mapping is None and not self.problems.has_errors:
+            if tree.get("recording") is None:
                 label = "`horizon: recording` needs a `recording` in the scenario"
                 self.problems.error("missing", node.span, label)
             return None
@@ -102,19 +102,23 @@ class _ScenarioReader(StimulusReader):
     def _read_recording(self, document: Document, tree: MappingNode) -> RecordingSource | None:
         """Return the recording with its map, or None without a recording.
 
-        The map is named, or it is written in the scenario.
+        The map is named, or it is written in the scenario. Beside the name of a map only `file` is
+        allowed; other keys are reported.
         """
         node = tree.get("recording")
         if node is None:
             return None
         table = self.read_mapping(node, "recording", RECORDING_KEYS)
         file = self.read_scalar(table.get("file"), "file", table.span)
-        named = table.get("map")
-        if isinstance(named, ScalarNode):
-            for key in ("time", "columns", "constants"):
-                if key in table.entries:
-                    label = f"`{key}` is given by the map `{named.text}`"
-                    self.problems.error("form", table.entries[key].span, label)
+        if "map" in table.entries:
+            named = self.read_scalar(table.get("map"), "map", table.span)
+            if named is None:
+                return None
+            for entry in table:
+                if entry.key in MAP_KEYS and entry.key != "map":
+                    label = f"`{entry.key}` is given by the map `{named.text}`"
+                    hint = "write it in the map, or write the whole map here without `map`"
+                    self.problems.error("form", entry.span, label, hint)
             with self.problems.collect_errors():
                 other = expand_document(
                     self.project.read(self.project.path_of(named.text, named.span)), self.project

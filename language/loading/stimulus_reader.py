@@ -24,12 +24,12 @@ from language.expressions.syntax_tree import (
 from language.expressions.units import NO_UNIT, SECOND, Unit, are_compatible, parse_unit
 from language.model.declaration import Formula
 from language.model.system import Stimulus, StimulusPiece, SystemInput
-from language.reading.difference_literal import read_difference
-from language.reading.reader import Reader
+from language.readers.base_reader import Reader
+from language.readers.difference_literal import read_difference
 from language.text.diagnostic import Span
 from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
-from language.typecheck.environment import NameEnvironment
 from language.typecheck.infer import TypeChecker
+from language.typecheck.name_environment import NameEnvironment
 
 FORMS = ("steps", "ramp", "chirp", "table", "pulses")
 """Keys that give an input as a function of time; at most one is allowed."""
@@ -75,7 +75,7 @@ class StimulusReader(Reader):
         A scalar is a constant, or for a real input a formula of `time` without jumps. A mapping has
         `start` and at most one of FORMS; without one it is the constant `start`. An input that is
         not real has only `steps`, a bool one also `pulses`. `table` is linear, or constant between
-        points with `hold: previous`.
+        points with `hold: previous`; other forms have no `hold`.
 
         `periods` [s] are those of the sampled automata that read the input; `pulses` need exactly
         one, which is their length.
@@ -85,6 +85,9 @@ class StimulusReader(Reader):
             return Stimulus((self._read_piece(entry.key, entry.node, declaration),), is_bool=truth)
         table = self.read_mapping(entry.node, f"inputs.{entry.key}", INPUT_KEYS)
         forms = [key for key in FORMS if table.get(key) is not None]
+        if "hold" in table.entries and forms != ["table"]:
+            label = "`hold` belongs to a `table`"
+            self.problems.error("form", table.entries["hold"].span, label)
         if forms == ["pulses"]:
             return Stimulus(
                 tuple(self._read_pulses(entry, table, declaration, periods)), is_bool=truth
@@ -149,19 +152,28 @@ class StimulusReader(Reader):
     def read_time(
         self, node: YamlNode | None, what: str, span: Span, lower_bound: str = "above"
     ) -> Fraction:
+        """Return a time [s] like `read_valid_time`; 1 s after a problem."""
+        time = self.read_valid_time(node, what, span, lower_bound)
+        return Fraction(1) if time is None else time
+
+    def read_valid_time(
+        self, node: YamlNode | None, what: str, span: Span, lower_bound: str = "above"
+    ) -> Fraction | None:
         """Return a time [s] above zero, or with `lower_bound="at least"` of at least zero.
 
-        Another value or dimension gives 1 s; it is reported unless there are errors already. A
-        missing node is reported and counts as 0 s. `what` names the time in messages.
+        A missing node, an expression, another value and another dimension are reported and give
+        None. `what` names the time in messages.
         """
+        known = len(self.problems.reported)
         value, unit = self.read_quantity(node, what, span, None)
+        if len(self.problems.reported) > known:
+            return None
         fine = value > 0 or (value == 0 and lower_bound == "at least")
         if not fine or (value and not are_compatible(unit.dimension, SECOND)):
-            if not self.problems.has_errors:
-                place = node.span if node else span
-                label = f"`{what}` is a time {lower_bound} zero, like `2.5 s`"
-                self.problems.error("range", place, label)
-            return Fraction(1)
+            place = node.span if node else span
+            label = f"`{what}` is a time {lower_bound} zero, like `2.5 s`"
+            self.problems.error("range", place, label)
+            return None
         return value
 
     def _read_steps(
@@ -170,8 +182,11 @@ class StimulusReader(Reader):
         """Return one piece for each step; times that do not ascend are reported."""
         pieces: list[StimulusPiece] = []
         for step in self.read_mapping(table.get("steps"), f"inputs.{entry.key}.steps"):
-            time = self.read_time(ScalarNode(step.key, step.span), "the time of a step", step.span)
+            key = ScalarNode(step.key, step.span)
+            time = self.read_valid_time(key, "the time of a step", step.span)
             value = self._read_value(step.node, "step", step.span, declaration)
+            if time is None:
+                continue
             if pieces and time <= pieces[-1].start:
                 self.problems.error("order", step.span, "steps are in the order of time")
             pieces.append(StimulusPiece(time, value))
@@ -201,7 +216,9 @@ class StimulusReader(Reader):
             self.problems.error("form", table.entries["start"].span, label)
         (period,) = {*periods}
         for item in self.read_list(node.node, "pulses"):
-            time = self.read_time(item, "the time of a pulse", item.span)
+            time = self.read_valid_time(item, "the time of a pulse", item.span)
+            if time is None:
+                continue
             if time < pieces[-1].start:
                 label = "pulses are in the order of time, a period apart"
                 self.problems.error("order", item.span, label)
@@ -217,29 +234,33 @@ class StimulusReader(Reader):
 
         They are linear, or constant with `hold: previous`. Problems give the constant 0.
         """
+        known = len(self.problems.reported)
         hold = self.read_choice(table.get("hold"), "hold", ("linear", "previous"), "linear")
         points: list[Breakpoint] = []
         for point in self.read_mapping(table.get("table"), f"inputs.{entry.key}.table"):
             key = ScalarNode(point.key, point.span)
-            time = self.read_time(key, "the time of a point", point.span, "at least")
+            time = self.read_valid_time(key, "the time of a point", point.span, "at least")
             value, _ = self.read_quantity(point.node, "point", point.span, unit)
+            if time is None:
+                continue
             if points and time <= points[-1][0]:
                 self.problems.error("order", point.span, "points are in the order of time")
             points.append((time, value))
         if table.get("start"):
             label = "a `table` has no `start`: before its first point it has the first value"
             self.problems.error("form", table.entries["start"].span, label)
-        if not points and not self.problems.has_errors:
+        if not points and len(self.problems.reported) == known:
             self.problems.error("missing", entry.span, "a `table` has at least one point")
-        if not points or self.problems.has_errors:
+        if not points or len(self.problems.reported) > known:
             return (StimulusPiece(Fraction(0), Fraction(0)),)
         return linear_pieces(points) if hold == "linear" else constant_pieces(points)
 
     def _read_time_span(self, table: MappingNode, what: str) -> tuple[Fraction, Fraction]:
         """Return `from` and `to` [s]; an end that is not after the begin is reported."""
+        known = len(self.problems.reported)
         begin = self.read_time(table.get("from"), "from", table.span, "at least")
         end = self.read_time(table.get("to"), "to", table.span)
-        if end <= begin and not self.problems.has_errors:
+        if end <= begin and len(self.problems.reported) == known:
             self.problems.error("order", table.span, f"a {what} ends after it begins")
         return begin, max(end, begin + Fraction(1, 10**9))
 

@@ -12,10 +12,10 @@ from language.ir.number_type import NumberType
 from language.loading.connection_reader import ConnectionReader
 from language.loading.load import automaton_of
 from language.model.automaton import Automaton
-from language.model.graphs import find_cycle, format_cycle, topological_sort
+from language.model.graph_algorithms import find_cycle, format_cycle, topological_sort
 from language.model.system import Connection, Instance, System, SystemInput
 from language.overlays.expand_document import Project, expand_document
-from language.reading.reader import Reader
+from language.readers.base_reader import Reader
 from language.text.diagnostic import Problems, Span, SpecError, suggest_name
 from language.text.document import Document, Entry, MappingNode, ScalarNode, YamlNode, require_kind
 from language.text.node_edit import format_inline
@@ -23,7 +23,7 @@ from language.text.node_edit import format_inline
 SYSTEM_KEYS = tuple(
     "language system inputs instances sensors connections outputs".split()  # noqa: SIM905
 )
-SYSTEM_INPUT_KEYS = ("unit", "default", "range", "type", "values")
+SYSTEM_INPUT_KEYS = ("unit", "default", "type", "values")
 INSTANCE_KEYS = ("of", "values", "offset")
 
 Connections = Mapping[tuple[str, str], Connection]

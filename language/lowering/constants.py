@@ -22,7 +22,7 @@ from language.ir.number_type import round_to_type
 from language.ir.ops import Assign, Block
 from language.ir.program import Constant
 from language.lowering.expressions import lower_assigned_value
-from language.lowering.parameter_bindings import (
+from language.lowering.program_parameters import (
     constant_bindings,
     constant_of,
     declaring_automaton,

@@ -45,7 +45,7 @@ from language.ir.program import Alarm, Variable
 from language.lowering.constants import evaluate_exactly
 from language.lowering.delay_buffers import memory_calls_by_key
 from language.lowering.expressions import NameBindings, lower_expression
-from language.lowering.parameter_bindings import constant_bindings
+from language.lowering.program_parameters import constant_bindings
 from language.model.automaton import Automaton, Mode
 from language.model.declaration import Formula
 

@@ -20,6 +20,7 @@ from language.expressions.syntax_tree import (
     memory_key,
     walk,
 )
+from language.ir.analysis_cache import cache_on_owner
 from language.ir.ops import (
     Assign,
     Block,
@@ -39,13 +40,12 @@ from language.ir.ops import (
 from language.ir.program import ValueType, Variable
 from language.lowering.constants import evaluate_exactly
 from language.lowering.expressions import NameBindings, lower_expression
-from language.model.analysis_cache import cache_on_owner
 from language.model.automaton import Automaton, Mode
 from language.model.declaration import Formula
 from language.model.truth_table import truth_table_formulas
 from language.text.diagnostic import Problems
-from language.typecheck.environment import NameEnvironment
 from language.typecheck.infer import TypeChecker
+from language.typecheck.name_environment import NameEnvironment
 from language.typecheck.types import EnumType, IntType
 
 MAX_DELAY = 4096

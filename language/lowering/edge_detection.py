@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from language.expressions.syntax_tree import EDGE_FUNCTIONS, FunctionCall, memory_key, walk
+from language.ir.analysis_cache import cache_on_owner
 from language.ir.ops import (
     Assign,
     Binary,
@@ -30,7 +31,6 @@ from language.ir.program import ValueType, Variable, mode_variable
 from language.lowering.chart_activity import is_active
 from language.lowering.delay_buffers import evaluate_ticks, expression_type
 from language.lowering.expressions import NameBindings, lower_expression
-from language.model.analysis_cache import cache_on_owner
 from language.model.automaton import Automaton, Mode
 
 

@@ -27,6 +27,7 @@ from language.expressions.syntax_tree import (
     memory_key,
     names,
 )
+from language.ir.analysis_cache import cache_on_owner
 from language.ir.ops import (
     Assign,
     Binary,
@@ -46,7 +47,6 @@ from language.ir.ops import (
     real,
 )
 from language.lowering.range_saturation import has_saturation
-from language.model.analysis_cache import cache_on_owner
 from language.model.automaton import Automaton, Balance, Mode, Region
 from language.model.declaration import Formula
 from language.model.evaluation_order import equation_order

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 
 from language.expressions.syntax_tree import Name
 from language.ir.ops import Block, FaultBit
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 from language.ir.traversal import walk_ops
 from language.lowering.range_saturation import MAX_FAULT_BITS, range_fault_of, saturable_variables
 from language.model.automaton import Automaton, Mode, Transition

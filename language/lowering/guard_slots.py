@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from language.ir.analysis_cache import cache_on_owner
 from language.ir.ops import Compare, Expr, Ref, integer
 from language.ir.program import mode_variable
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 from language.lowering.chart_activity import is_active
-from language.model.analysis_cache import cache_on_owner
 from language.model.automaton import Automaton, Mode
 from language.model.chart_paths import mode_paths
 

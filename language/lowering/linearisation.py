@@ -36,7 +36,7 @@ from language.expressions.syntax_tree import (
     walk,
 )
 from language.lowering.expressions import lower_expression
-from language.lowering.parameter_bindings import constant_bindings
+from language.lowering.program_parameters import constant_bindings
 from language.model.automaton import Automaton, Balance, Mode, ModelRun
 from language.model.evaluation_order import equation_order
 from language.numerics.evaluate import Scalar, evaluate

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 
 from language.expressions.units import Dimension
 from language.ir.number_type import NumberType, round_to_type
-from language.ir.ops import Assign, Binary, Block, Compare, Expr, Op, Ref, RunBlock, integer
+from language.ir.ops import Assign, Binary, Block, Compare, Expr, Op, Ref, integer
 from language.ir.program import (
     Constant,
     Function,
@@ -25,16 +25,16 @@ from language.ir.program import (
     mode_variable,
     value_type,
 )
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 from language.ir.round_literals import round_program
-from language.ir.traversal import block_names, walk_ops
+from language.ir.traversal import block_names, names_used, reachable_blocks
 from language.lowering.expressions import WHOLE_TYPES, lower_assigned_value
 from language.lowering.invariants import invariant_infos
-from language.lowering.parameter_bindings import cast_to_type
+from language.lowering.program_parameters import cast_to_type
 from language.lowering.range_saturation import store_initial_value
 from language.model.automaton import Automaton, Region
 from language.model.declaration import State
-from language.model.graphs import post_order
+from language.model.graph_algorithms import post_order
 from language.model.statechart import Chart
 from language.numerics.function_table import FUNCTIONS_BY_TYPE
 from language.typecheck.types import EnumType, IntType
@@ -286,8 +286,10 @@ def finalise_program(
     on stay. The elementary functions that are called are added. Literals are rounded to the number
     type. `retain_inputs` keeps only inputs that another block reads.
     """
-    blocks = _reachable_blocks(program.blocks, entries)
-    used = {name for block in blocks.values() for name in block_names(block)}
+    runs = (reachable_blocks(entry, program.blocks) for entry in entries if entry in program.blocks)
+    reached = set[str]().union(*runs)
+    blocks = {name: block for name, block in program.blocks.items() if name in reached}
+    used = names_used(blocks.values())
     used |= {*keep, *(wire.source for wire in program.outputs)}
     constants = [c for c in program.constants if c.name in used]
     while True:
@@ -320,25 +322,13 @@ def _remove_unused_before(
     """
     if "retain_inputs" not in blocks:
         return variables
-    reading = {n for name, b in blocks.items() if name != "retain_inputs" for n in block_names(b)}
+    reading = names_used(block for name, block in blocks.items() if name != "retain_inputs")
     assignments = tuple(
         op for op in blocks["retain_inputs"] if isinstance(op, Assign) and op.target in reading
     )
     blocks["retain_inputs"] = assignments
     targets = {op.target for op in assignments}
     return [v for v in variables if not v.name.startswith("before.") or v.name in targets]
-
-
-def _reachable_blocks(blocks: Mapping[str, Block], entries: tuple[str, ...]) -> dict[str, Block]:
-    """Return the blocks that the entries run, directly or through other blocks, in their order."""
-    seen: set[str] = set()
-    stack = [entry for entry in entries if entry in blocks]
-    while stack:
-        name = stack.pop()
-        if name not in seen:
-            seen.add(name)
-            stack += [op.block for op in walk_ops(blocks[name]) if isinstance(op, RunBlock)]
-    return {name: block for name, block in blocks.items() if name in seen}
 
 
 def _used_functions(used: set[str], number: NumberType) -> tuple[Function, ...]:

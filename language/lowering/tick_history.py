@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
+from language.ir.analysis_cache import cache_on_owner
 from language.ir.ops import (
     Assign,
     Block,
@@ -34,7 +35,6 @@ from language.ir.program import Variable, value_type
 from language.lowering.constants import evaluate_exactly
 from language.lowering.expressions import variable_bindings
 from language.lowering.program_builder import any_fired_condition
-from language.model.analysis_cache import cache_on_owner
 from language.model.automaton import Automaton, Mode, Rewind, Transition
 from language.model.region_queries import equation_closure, equation_formulas
 

@@ -11,11 +11,11 @@ from collections.abc import Iterator
 from fractions import Fraction
 
 from language.expressions.syntax_tree import Name
+from language.ir.analysis_cache import cache_on_owner
 from language.ir.program import MAX_TIMER_TICKS
-from language.model.analysis_cache import cache_on_owner
 from language.model.automaton import Automaton, Transition
 from language.model.declaration import Formula, Parameter, Range
-from language.model.names_read import names_read_by
+from language.model.used_names import names_read_by
 from language.text.diagnostic import Problems
 
 MAX_WAIT_TICKS = MAX_TIMER_TICKS - 1

@@ -16,7 +16,7 @@ from typing import Literal
 from language.expressions.syntax_tree import SyntaxTree
 from language.expressions.units import Dimension
 from language.ir.number_type import NumberType
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 from language.model.declaration import Formula, Input, Parameter, State
 from language.model.statechart import Chart, HistoryKind
 from language.model.truth_table import TruthTable

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 from language.model.statechart import ROOT, Chart, ChartNode
 
 

@@ -7,7 +7,7 @@ integration leaves out such states, so they keep their value bit for bit.
 from __future__ import annotations
 
 from language.expressions.syntax_tree import Name, NumberLiteral, SyntaxTree
-from language.model.analysis_cache import cache_on_owner
+from language.ir.analysis_cache import cache_on_owner
 from language.model.automaton import Automaton, Mode
 from language.model.region_queries import equation_formulas
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence, Set
 
 from language.expressions.syntax_tree import SyntaxTree, names
-from language.model.analysis_cache import cache_on_owner
+from language.ir.analysis_cache import cache_on_owner
 from language.model.automaton import Mode
-from language.model.graphs import (
+from language.model.graph_algorithms import (
     find_cycle,
     format_cycle,
     reachable,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Iterator, Mapping
 
-from language.model.analysis_cache import cache_on_owner
+from language.ir.analysis_cache import cache_on_owner
 from language.model.automaton import Balance, Mode, Region, Transition
 from language.model.declaration import Formula
 

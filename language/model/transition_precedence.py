@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from language.expressions.syntax_tree import MEMORY_FUNCTIONS, FunctionCall, walk
-from language.model.analysis_cache import cache_on_owner
+from language.ir.analysis_cache import cache_on_owner
 from language.model.automaton import Automaton, Mode, Transition
 from language.model.region_queries import transitions_by_priority
 from language.model.statechart import ChartNode

@@ -10,7 +10,6 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from language.expressions.syntax_tree import structural_key
 from language.ir.ops import (
     Assign,
     Binary,
@@ -32,7 +31,7 @@ from language.ir.ops import (
 )
 from language.ir.program import Variable
 from language.lowering.constants import evaluate_constant
-from language.lowering.parameter_bindings import tunables_of
+from language.lowering.program_parameters import tunables_of
 from language.lowering.range_saturation import store_saturated
 from language.model.automaton import Automaton, Mode, Observer
 from language.numerics.evaluate import Scalar
@@ -183,10 +182,7 @@ def covariance_limit_blocks(
 
 def _limit_forms(observer: Observer) -> dict[str, object]:
     """Return the variance limits of an observer as comparable keys, by state."""
-    return {
-        n: (structural_key(low.tree), structural_key(high.tree))
-        for n, (low, high) in observer.variance_limits.items()
-    }
+    return {n: (low.tree, high.tree) for n, (low, high) in observer.variance_limits.items()}
 
 
 def variance_limits(

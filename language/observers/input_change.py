@@ -27,7 +27,7 @@ from language.ir.ops import (
 from language.ir.program import Constant, Variable
 from language.lowering.constants import evaluate_constant
 from language.lowering.expressions import NameBindings
-from language.lowering.parameter_bindings import tunables_of
+from language.lowering.program_parameters import tunables_of
 from language.lowering.range_saturation import store_saturated
 from language.model.automaton import Automaton, Observer
 from language.numerics.evaluate import Scalar

@@ -29,7 +29,7 @@ from language.ir.ops import (
 from language.ir.program import Constant, ObserverInfo
 from language.lowering.expressions import NameBindings, lower_expression
 from language.lowering.observer_matrices import derive_observer_matrices
-from language.lowering.parameter_bindings import constant_bindings, tunables_of
+from language.lowering.program_parameters import constant_bindings, tunables_of
 from language.model.automaton import Automaton, Mode, ModelRun, Observer
 from language.model.declaration import Formula
 from language.numerics.evaluate import Scalar, evaluate

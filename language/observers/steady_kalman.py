@@ -30,7 +30,7 @@ from language.ir.program import Constant, ObserverInfo, Variable
 from language.lowering.constants import evaluate_constant
 from language.lowering.expressions import NameBindings, lower_expression
 from language.lowering.observer_matrices import derive_observer_matrices
-from language.lowering.parameter_bindings import tunables_of
+from language.lowering.program_parameters import tunables_of
 from language.lowering.range_saturation import store_saturated
 from language.model.automaton import Automaton, Mode, Observer
 from language.model.declaration import Formula

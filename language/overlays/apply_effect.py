@@ -23,11 +23,11 @@ from language.overlays.effect_edits import (
 )
 from language.overlays.effect_place import EffectPlace, Hole, PlaceMismatch, find_effect_place
 from language.overlays.effect_reader import ADDED_SECTIONS, EffectApplication, added_names
+from language.overlays.name_types import formula_entries
 from language.overlays.parameter_override import set_parameter_value
-from language.overlays.tree_types import formula_entries
 from language.text.diagnostic import Problems, Source, Span, suggest_name
 from language.text.document import Entry, MappingNode, ScalarNode, SequenceNode, YamlNode
-from language.text.formula_sites import EFFECT_SITES, KeyPath, map_formulas
+from language.text.expression_paths import EFFECT_SITES, KeyPath, map_formulas
 from language.text.node_edit import find_node, mapping_entries, put_node, replace_source, scalars_of
 from language.text.overlay import apply_overlay
 
@@ -243,7 +243,11 @@ class _EffectApplier:
         node, raw = body.get("redirect"), self.body.get("redirect")
         if not isinstance(node, MappingNode) or not isinstance(raw, MappingNode):
             return tree
-        excepted = tuple(self._fill_text(item.text) for item in scalars_of(raw.get("except")))
+        excepted = tuple(
+            path
+            for item in scalars_of(raw.get("except"))
+            for path in self._fill_key(item.text, ("redirect",))
+        )
         for entry in raw:
             if entry.key == "except" or not isinstance(entry.node, MappingNode):
                 continue

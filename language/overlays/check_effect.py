@@ -7,8 +7,8 @@ from collections.abc import Collection
 
 from language.expressions.syntax_tree import FunctionCall, SyntaxTree, children
 from language.expressions.units import NO_UNIT, UNKNOWN_UNIT
-from language.reading.parameter_reader import ParameterReader
-from language.reading.reader import Reader
+from language.readers.base_reader import Reader
+from language.readers.parameter_reader import ParameterReader
 from language.text.diagnostic import Problems, Span, suggest_name
 from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
 from language.text.node_edit import format_inline, mapping_entries, put_node, scalars_of

@@ -13,15 +13,15 @@ from language.expressions.text_rewrite import (
     split_summands,
     substitute_reads,
 )
-from language.overlays.tree_types import formula_entries
-from language.reading.element_reader import outputs_as_mapping
+from language.overlays.name_types import formula_entries
+from language.readers.element_reader import outputs_as_mapping
 from language.text.diagnostic import Span
 from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
-from language.text.formula_sites import AUTOMATON_SITES, KeyPath, map_formulas
+from language.text.expression_paths import AUTOMATON_SITES, KeyPath, map_formulas
 from language.text.node_edit import find_node, mapping_entries, put_node
 
-MODE_CONTAINERS = frozenset({"modes", "regions", "templates"})
-"""Sections at the root that contain modes."""
+MODE_CONTAINERS = frozenset({"modes", "regions", "templates", "transition_table"})
+"""Sections at the root that contain modes or transitions of modes."""
 
 PathPredicate = Callable[[KeyPath], bool]
 """Tells whether an edit applies to the expression at a key path."""
@@ -46,11 +46,12 @@ def redirect_reads(
 ) -> tuple[MappingNode, frozenset[str]]:
     """Return a tree with the reads at some paths redirected, and the old names that were found.
 
-    A path is a key path like `flow.w`: from the root with all expressions below it, or the end of a
-    key path inside a mode, region or template. `everywhere` stands for all expressions and outputs,
-    `outputs` for outputs. A path of an equation also covers the equations that only this equation
-    reads, directly or indirectly. `exceptions` apply to `everywhere` only. `der(x)`, `in(x)`,
-    parameters and start values are not redirected.
+    A path is a key path like `flow.w` with all expressions below it: from the root, and inside each
+    mode, region, template and transition table. `everywhere` stands for all expressions and
+    outputs, `outputs` for outputs. A path of an equation also covers the equations that only this
+    equation reads, directly or indirectly. `exceptions` are key paths of the same form, `outputs`
+    or `outputs.<name>`; what they match is never redirected, and neither are `der(x)`, `in(x)`,
+    parameters and start values.
     """
     redirected_names: set[str] = set()
     applies_to = _path_predicate(tree, redirection)
@@ -101,8 +102,8 @@ def rewrite_equation(tree: MappingNode, name: str, formula: ScalarNode) -> Mappi
 def has_formula_at(tree: MappingNode, key: str) -> bool:
     """Tell whether there is an expression at or below a key path such as `flow.w_w`.
 
-    Inside modes, regions and templates an expression counts if its key path ends with `key`. It is
-    always true for `everywhere` and `outputs`. Parameters and start values do not count.
+    The key path is one from the root or one inside a mode, region, template or transition table. It
+    is always true for `everywhere` and `outputs`. Parameters and start values do not count.
     """
     if key in ("everywhere", "outputs"):
         return True
@@ -119,18 +120,23 @@ def has_formula_at(tree: MappingNode, key: str) -> bool:
 
 def _path_predicate(tree: MappingNode, redirection: Redirection) -> PathPredicate:
     """Return the predicate of the paths to which a redirection applies."""
-    if "everywhere" in redirection.paths:
-        return lambda path: not any(_matches_key(path, key) for key in redirection.exceptions)
+    is_everywhere = "everywhere" in redirection.paths
     keys = [name for path in redirection.paths for name in _equation_keys(tree, path)]
-    return lambda path: any(_matches_key(path, key) for key in keys)
+
+    def applies(path: KeyPath) -> bool:
+        """Return whether the paths cover an expression and the exceptions do not."""
+        is_covered = is_everywhere or any(_matches_key(path, key) for key in keys)
+        return is_covered and not any(_matches_key(path, key) for key in redirection.exceptions)
+
+    return applies
 
 
 def _matches_key(path: KeyPath, key: str) -> bool:
     """Tell whether a path is a key path or below it; `flow.w` also matches in each mode."""
     key_path = tuple(key.split("."))
-    if path[: len(key_path)] == key_path:
-        return True
-    return path[0] in MODE_CONTAINERS and path[-len(key_path) :] == key_path
+    length = len(key_path)
+    starts = range(len(path) - length + 1) if path[0] in MODE_CONTAINERS else (0,)
+    return any(path[start : start + length] == key_path for start in starts)
 
 
 def _equation_keys(tree: MappingNode, key: str) -> list[str]:
@@ -164,11 +170,15 @@ def _equation_keys(tree: MappingNode, key: str) -> list[str]:
 def _redirect_outputs(
     outputs: MappingNode, redirection: Redirection
 ) -> tuple[MappingNode, set[str]]:
-    """Return the outputs with their variables replaced, and the old names that were found."""
+    """Return the outputs with their variables replaced, and the old names that were found.
+
+    Outputs among the exceptions of the redirection are not replaced.
+    """
     entries, hits = {}, set()
     for entry in outputs:
         node = entry.node
-        if isinstance(node, ScalarNode) and node.text in redirection.replacements:
+        is_free = not any(_matches_key(("outputs", entry.key), k) for k in redirection.exceptions)
+        if is_free and isinstance(node, ScalarNode) and node.text in redirection.replacements:
             hits.add(node.text)
             node = rewrite_scalar(node, redirection.replacements[node.text], redirection.span)
         entries[entry.key] = Entry(entry.key, entry.span, node)

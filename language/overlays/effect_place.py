@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from language.expressions.text_rewrite import split_balance
 from language.expressions.units import SECOND, Dimension, are_compatible
 from language.overlays.effect_reader import ELEMENT_PARTS, Effect, PlacePattern
-from language.overlays.tree_types import TreeTypes, format_si_unit, formula_entries
-from language.reading.element_reader import outputs_as_mapping
+from language.overlays.name_types import TreeTypes, format_si_unit, formula_entries
+from language.readers.element_reader import outputs_as_mapping
 from language.text.diagnostic import suggest_name
 from language.text.document import MappingNode, ScalarNode
 from language.text.node_edit import scalars_of

@@ -15,10 +15,10 @@ from language.overlays.check_effect import (
     check_parameters,
     report_unknown_hole,
 )
-from language.reading.reader import Reader
+from language.readers.base_reader import Reader
 from language.text.diagnostic import Problems, Span, suggest_name
 from language.text.document import Document, Entry, MappingNode, ScalarNode, YamlNode, require_kind
-from language.text.formula_sites import EFFECT_SITES, KeyPath, map_formulas
+from language.text.expression_paths import EFFECT_SITES, KeyPath, map_formulas
 
 EffectLookup = Callable[[str, Span], Document]
 """Returns the document of the effect of a name; the span is where the name is written."""
@@ -341,7 +341,7 @@ def _parse_formula(path: KeyPath, scalar: ScalarNode, problems: Problems) -> tup
     Returns an empty tuple after a reported problem.
     """
     with problems.collect_errors():
-        if path[0] == "flow" or path[-2:-1] == ("flow",):
+        if path[0] != "redirect" and "flow" in (path[0], *path[-2:-1]):
             return parse_balance(scalar)
         return (parse_expression(scalar),)
     return ()

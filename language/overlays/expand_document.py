@@ -14,7 +14,7 @@ from language.overlays.calibration import (
     set_instance_value,
 )
 from language.overlays.effect_reader import read_effect_application
-from language.reading.reader import Reader
+from language.readers.base_reader import Reader
 from language.text.diagnostic import Problems, Source, Span, SpecError
 from language.text.document import Document, Entry, MappingNode, ScalarNode, SequenceNode
 from language.text.node_edit import mapping_entries

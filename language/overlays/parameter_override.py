@@ -9,7 +9,7 @@ from collections.abc import Iterable
 
 from language.expressions.units import NO_UNIT
 from language.ir.number_type import round_to_type
-from language.reading.reader import Quantity, Reader
+from language.readers.base_reader import Quantity, Reader
 from language.text.diagnostic import Problems, suggest_name
 from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
 from language.text.node_edit import put_node

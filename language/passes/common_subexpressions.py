@@ -4,22 +4,22 @@
     b = x * y + 2.0          a = x_y + 1.0
                              b = x_y + 2.0
 
-Local value numbering (Cocke and Schwartz 1970): equal operations on equal numbers have equal
-numbers, and a variable that is written gets a new number.
+The values are those of a local value numbering.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping
 
 from language.ir.formula_name import format_formula, formula_name
-from language.ir.ops import Assign, Binary, Block, Call, Expr, Item, Op, Ref, RunBlock, Store, Value
+from language.ir.ops import Assign, Binary, Block, Call, Expr, Op, Ref, Store
 from language.ir.program import Program, Variable
 from language.ir.rewrite_ops import direct_expressions, map_expressions, map_operands, operands
-from language.ir.traversal import block_writes, walk_ops
+from language.ir.traversal import block_writes, called_blocks, reachable_blocks
 from language.lowering.expressions import is_whole
+from language.passes.value_numbering import ValueNumbering
 
 CHEAP_FUNCTIONS = ("real", "whole", "abs")
 """Functions that cost no more than reading a variable."""
@@ -37,7 +37,7 @@ def eliminate_common_subexpressions(program: Program) -> Program:
     taken = {name.partition(".")[2].lower() for name in _all_names(program)}
     variables: dict[str, Variable] = {}
     blocks = {
-        name: _ValueNumbering(block, writes, taken, variables).rewrite()
+        name: _BlockRewriter(block, writes, taken, variables).rewrite()
         for name, block in program.blocks.items()
     }
     return dataclasses.replace(
@@ -45,8 +45,8 @@ def eliminate_common_subexpressions(program: Program) -> Program:
     )
 
 
-class _ValueNumbering:
-    """Value numbering of the assignments of one block; nested operations are not rewritten."""
+class _BlockRewriter:
+    """Rewriter of the assignments of one block; nested operations are not rewritten."""
 
     def __init__(
         self,
@@ -59,11 +59,9 @@ class _ValueNumbering:
         self.writes = writes
         self.used_names = used_names
         self.variables = variables
-        self.versions: Counter[str] = Counter()
+        self.values = ValueNumbering()
         self.use_counts: Counter[int] = Counter()
         self.names_by_number: dict[int, str] = {}
-        self.numbers: dict[Hashable, int] = {}
-        self.number_cache: dict[int, int] = {}
         self.rewritten_ops: list[Op] = []
 
     def rewrite(self) -> Block:
@@ -76,7 +74,7 @@ class _ValueNumbering:
                 for expr in direct_expressions(op):
                     self._count_uses(expr)
             self._invalidate_written(op)
-        self.versions.clear()
+        self.values.versions.clear()
         for op in self.block:
             if isinstance(op, Assign | Store):
                 (changed,) = map_expressions((op,), self._replace_repeated)
@@ -88,42 +86,14 @@ class _ValueNumbering:
 
     def _invalidate_written(self, op: Op) -> None:
         """Start a new version of each variable that an operation writes, directly or by a block."""
-        self.number_cache.clear()
-        self.versions.update(set(block_writes((op,))))
-        for inner in walk_ops((op,)):
-            if isinstance(inner, RunBlock):
-                self.versions.update(self.writes[inner.block])
-
-    def _value_number(self, expr: Expr) -> int:
-        """Return the number of the value of an expression; it is cached for one operation."""
-        if id(expr) not in self.number_cache:
-            value = self._value_key(expr)
-            self.number_cache[id(expr)] = self.numbers.setdefault(value, len(self.numbers))
-        return self.number_cache[id(expr)]
-
-    def _value_key(self, expr: Expr) -> Hashable:
-        """Return a key that is equal for expressions with equal values.
-
-        Comparisons, selections and unary operations get a key of their own.
-        """
-        match expr:
-            case Value(value):
-                return repr(value)
-            case Ref(name):
-                return name, self.versions[name]
-            case Item(name, index):
-                return name, self.versions[name], self._value_number(index)
-            case Binary(operator, left, right):
-                return operator, self._value_number(left), self._value_number(right)
-            case Call(function, arguments):
-                return function, tuple(self._value_number(argument) for argument in arguments)
-            case _:
-                return id(expr)
+        self.values.versions.update(set(block_writes((op,))))
+        for called in called_blocks((op,)):
+            self.values.versions.update(self.writes[called])
 
     def _count_uses(self, expr: Expr) -> None:
         """Count the values of an expression; the parts of a repeated value are skipped."""
         if _is_worth_naming(expr):
-            key = self._value_number(expr)
+            key = self.values.number_of(expr)
             self.use_counts[key] += 1
             if self.use_counts[key] > 1:
                 return  # its parts are not computed again either
@@ -135,7 +105,7 @@ class _ValueNumbering:
 
         The first use appends the assignment of the variable to the rewritten operations.
         """
-        key = self._value_number(expr) if _is_worth_naming(expr) else None
+        key = self.values.number_of(expr) if _is_worth_naming(expr) else None
         if key is None or self.use_counts[key] < 2:
             return map_operands(expr, self._replace_repeated)
         if key not in self.names_by_number:
@@ -176,19 +146,11 @@ def _all_names(program: Program) -> list[str]:
 
 def _transitive_writes(program: Program) -> dict[str, frozenset[str]]:
     """Return the variables that each block writes, directly or through the blocks that it runs."""
-    found: dict[str, frozenset[str]] = {}
-
-    def visit(name: str) -> frozenset[str]:
-        """Return the variables that a block writes, and store them in `found`."""
-        if name not in found:
-            block = program.blocks[name]
-            own = set(block_writes(block))
-            for op in walk_ops(block):
-                if isinstance(op, RunBlock):
-                    own |= visit(op.block)
-            found[name] = frozenset(own)
-        return found[name]
-
-    for name in program.blocks:
-        visit(name)
-    return found
+    return {
+        name: frozenset(
+            variable
+            for run in reachable_blocks(name, program.blocks)
+            for variable in block_writes(program.blocks[run])
+        )
+        for name in program.blocks
+    }

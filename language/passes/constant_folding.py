@@ -34,7 +34,7 @@ from language.ir.ops import (
 from language.ir.printer import format_expr
 from language.ir.program import Constant, Program, Variable
 from language.ir.rewrite_ops import map_expressions, map_operands, operands
-from language.ir.traversal import block_names, block_writes, expr_names
+from language.ir.traversal import block_writes, expr_names, names_used
 from language.lowering.expressions import is_whole
 from language.numerics.evaluate import Scalar, evaluate
 from language.passes.common_subexpressions import CHEAP_FUNCTIONS, eliminate_common_subexpressions
@@ -176,7 +176,7 @@ def eliminate_redundancy(program: Program) -> Program:
 
 def _remove_unused_constants(program: Program) -> Program:
     """Return the Program without the fixed parameters that no block reads."""
-    used = {name for block in program.blocks.values() for name in block_names(block)}
+    used = names_used(program.blocks.values())
     constants = tuple(
         c for c in program.constants if c.name in used or not c.name.startswith(CONSTANT_PREFIX)
     )

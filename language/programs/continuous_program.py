@@ -38,7 +38,14 @@ from language.integration.vector_field import (
     lower_single_region_step,
 )
 from language.ir.ops import Assign, Binary, Block, Expr, Ref, RunBlock, add, integer, multiply
-from language.ir.program import Program, StabilityLimit, TransitionInfo, Variable, fired_variable
+from language.ir.program import (
+    ENTRY_BLOCKS,
+    Program,
+    StabilityLimit,
+    TransitionInfo,
+    Variable,
+    fired_variable,
+)
 from language.lowering.action_stages import discrete_variables
 from language.lowering.constants import constant_values, parameter_constants
 from language.lowering.continuous_delay import (
@@ -50,12 +57,11 @@ from language.lowering.continuous_delay import (
     continuous_delays_of,
     delayed_value_bindings,
 )
-from language.lowering.continuous_edges import edge_bindings, level_variables, reset_levels
+from language.lowering.continuous_edge_detection import edge_bindings, level_variables, reset_levels
 from language.lowering.expressions import NameBindings, lower_equations, variable_bindings
 from language.lowering.guard_slots import mode_bindings
 from language.lowering.invariants import INVARIANTS, invariant_blocks, invariant_variables
 from language.lowering.linearisation import LinearisationPoint
-from language.lowering.parameter_bindings import constant_bindings
 from language.lowering.program_builder import (
     assemble_program,
     finalise_program,
@@ -63,7 +69,8 @@ from language.lowering.program_builder import (
     region_variables,
     state_variables,
 )
-from language.lowering.transition_infos import infos_of_mode, transition_infos
+from language.lowering.program_parameters import constant_bindings
+from language.lowering.transition_metadata import infos_of_mode, transition_infos
 from language.model.automaton import Automaton, Mode, Transition
 from language.programs.engine_blocks import engine_blocks
 from language.programs.major_step import (
@@ -87,7 +94,6 @@ from language.programs.parallel_regions import (
 )
 from language.text.diagnostic import Problems
 
-ENTRY_BLOCKS = ("init", "derive", "step")
 ENGINE_BLOCKS = (
     "latch",
     "start",

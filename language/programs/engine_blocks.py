@@ -32,7 +32,7 @@ from language.lowering.continuous_delay import (
     fill_block,
     record_block,
 )
-from language.lowering.continuous_edges import reset_levels, store_levels
+from language.lowering.continuous_edge_detection import reset_levels, store_levels
 from language.lowering.expressions import NameBindings, equation_bindings
 from language.lowering.guard_slots import guard_slots
 from language.lowering.program_builder import clear_fired, enter_initial_modes, lower_initial_values

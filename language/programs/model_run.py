@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from language.expressions.syntax_tree import structural_key
 from language.integration.crossing_location import (
     RUN_BISECTIONS,
     continuous_step_blocks,
@@ -47,12 +46,12 @@ from language.ir.ops import (
     subtract,
 )
 from language.ir.program import Constant, IntegrationInfo, Variable, mode_variable
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 from language.lowering.delay_buffers import find_memory_call
 from language.lowering.expressions import variable_bindings
 from language.lowering.linearisation import LinearisationPoint, linearise_model
-from language.lowering.parameter_bindings import cast_to_type, constant_bindings
 from language.lowering.program_builder import enter_initial_modes
+from language.lowering.program_parameters import cast_to_type, constant_bindings
 from language.lowering.range_saturation import saturate_written_states
 from language.model.automaton import Automaton, Mode, ModelRun
 from language.model.constant_states import written_states
@@ -279,7 +278,7 @@ def _substep_without_events(
 
 def _settings_key(run: ModelRun) -> tuple[object, ...]:
     """Return the settings that all runs of an automaton must share, as a comparable key."""
-    at = {name: structural_key(formula.tree) for name, formula in (run.linearise or {}).items()}
+    at = {name: formula.tree for name, formula in (run.linearise or {}).items()}
     return run.method, run.substeps, run.linearise is None, at
 
 

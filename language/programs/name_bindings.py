@@ -20,8 +20,8 @@ from language.lowering.expressions import equation_bindings, variable_bindings
 from language.lowering.fault_mode import FAULT_GUARD
 from language.lowering.guard_slots import mode_bindings
 from language.lowering.invariants import invariant_variables
-from language.lowering.parameter_bindings import constant_bindings
 from language.lowering.program_builder import input_variables, region_variables, state_variables
+from language.lowering.program_parameters import constant_bindings
 from language.lowering.range_saturation import FAULT_HAPPENED, saturation_variables
 from language.lowering.truth_tables import truth_table_variables
 from language.model.automaton import Automaton

@@ -18,7 +18,7 @@ from language.charts.micro_step import (
 )
 from language.ir.ops import Assign, Block, Op, RunBlock, Value, integer
 from language.ir.program import Constant, IntegrationInfo, ModeInfo, Program
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 from language.lowering.action_stages import (
     commit_stage,
     initial_entry_assignments,
@@ -45,7 +45,7 @@ from language.lowering.program_builder import (
 )
 from language.lowering.range_saturation import initialise_latched_inputs, latch_inputs
 from language.lowering.tick_history import record_tick_history
-from language.lowering.transition_infos import start_run, transition_infos
+from language.lowering.transition_metadata import start_run, transition_infos
 from language.lowering.truth_tables import truth_table_block
 from language.model.automaton import Automaton, Mode
 from language.model.declaration import MICRO_STEP_LIMIT_FAULT

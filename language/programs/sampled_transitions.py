@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import ChainMap
 from collections.abc import Callable, Mapping
 
+from language.ir.analysis_cache import cache_on_owner
 from language.ir.ops import (
     Assign,
     Block,
@@ -23,8 +24,7 @@ from language.lowering.action_stages import lower_entry, lower_stage, lower_stag
 from language.lowering.edge_detection import detect_edges, guard_memory_bindings, reset_activation
 from language.lowering.expressions import equation_bindings, lower_expression, names_read
 from language.lowering.tick_history import Rollback
-from language.lowering.transition_infos import infos_of_mode, start_run, wait_ticks
-from language.model.analysis_cache import cache_on_owner
+from language.lowering.transition_metadata import infos_of_mode, start_run, wait_ticks
 from language.model.automaton import Automaton, Mode, Transition
 from language.model.declaration import Formula
 from language.model.region_queries import transitions_by_priority

@@ -24,7 +24,7 @@ def is_infeasible(inequalities: Sequence[Inequality]) -> bool:
     The variable that creates the fewest new inequalities is eliminated first, ties by name.
     A variable with the coefficient 0 does not occur.
     """
-    remaining = [
+    remaining: list[Inequality] = [
         (_without_zeros(factors), constant, is_strict)
         for factors, constant, is_strict in inequalities
     ]

@@ -24,7 +24,7 @@ from language.ir.ops import (
     subtract,
 )
 from language.lowering.expressions import lower_rate
-from language.smt.guard_snapshot import GuardSnapshot
+from language.smt.symbolic_environment import GuardSnapshot
 
 ZERO = real(0.0)
 """Derivative of a constant."""

@@ -16,12 +16,11 @@ from language.ir.ops import Assign, Expr
 from language.ir.program import value_type
 from language.lowering.action_stages import storage_of
 from language.lowering.constants import constant_values, derive_block, parameter_constants
-from language.lowering.parameter_bindings import parameter_kinds
+from language.lowering.program_parameters import parameter_kinds
 from language.model.automaton import Automaton
 from language.model.declaration import Input, Parameter, State
 from language.numerics.evaluate import Scalar
-from language.smt.guard_snapshot import SymbolicPath
-from language.smt.linear_bounds import narrow_domains
+from language.smt.bound_propagation import narrow_domains
 from language.smt.query import (
     SolverQuery,
     SymbolicAssignment,
@@ -30,6 +29,7 @@ from language.smt.query import (
     format_valuation,
 )
 from language.smt.sample_points import all_sample_points, first_sample_points, neighbouring_points
+from language.smt.symbolic_environment import SymbolicPath
 from language.smt.z3_backend import SMALL_RESOURCE_LIMIT, Solver, Verdict
 from language.text.diagnostic import Problems
 

@@ -16,10 +16,10 @@ from language.expressions.syntax_tree import (
 )
 from language.expressions.units import PURE_NUMBER, Dimension, dimension_sqrt
 from language.text.diagnostic import suggest_name
+from language.typecheck.checker_protocol import TypingContext
 from language.typecheck.integer_functions import integer_call_range
-from language.typecheck.memory_calls import ALLOWED_PLACES, infer_lookup, infer_memory_call
+from language.typecheck.stateful_functions import ALLOWED_PLACES, infer_lookup, infer_memory_call
 from language.typecheck.types import ExprType, IntType
-from language.typecheck.typing_context import TypingContext
 
 ANGLE = Dimension(angle=1)
 SAME_UNIT_FUNCTIONS = {"abs": 1, "min": 2, "max": 2, "clip": 3}

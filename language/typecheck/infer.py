@@ -32,8 +32,8 @@ from language.expressions.units import (
     matching_units_hint,
 )
 from language.text.diagnostic import Problems, Span, suggest_name
-from language.typecheck.environment import NameEnvironment
 from language.typecheck.function_calls import infer_function_call
+from language.typecheck.name_environment import NameEnvironment
 from language.typecheck.types import (
     MAX_INT,
     BoolType,

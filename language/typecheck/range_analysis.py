@@ -25,9 +25,7 @@ from language.expressions.syntax_tree import (
     Power,
     Relation,
     SyntaxTree,
-    TreeNumbering,
     children,
-    is_same_expression,
 )
 from language.typecheck.interval import (
     UNBOUNDED,
@@ -38,8 +36,8 @@ from language.typecheck.interval import (
     power_or_inf,
 )
 
-Constraints = Mapping[int, Interval]
-"""Intervals that enclosing conditions impose on expressions, by the number of the expression."""
+Constraints = Mapping[SyntaxTree, Interval]
+"""Intervals that enclosing conditions impose on expressions."""
 NO_CONSTRAINTS: Constraints = {}
 IntervalLookup = Callable[[str], Interval]
 DomainReport = Callable[[str, SyntaxTree, Interval], None]
@@ -58,21 +56,16 @@ class RangeAnalysis:
         self,
         name_interval: IntervalLookup,
         table_interval: IntervalLookup,
-        numbering: TreeNumbering,
         report: DomainReport | None = None,
     ) -> None:
         """Store the functions that give the intervals of names and of tables by name.
 
-        `numbering` identifies expressions that are equal. Without `report` nothing is reported.
+        Without `report` nothing is reported.
         """
         self.name_interval = name_interval
         self.table_interval = table_interval
-        self.numbering = numbering
         self.report = report
-        self.without_reports = (
-            RangeAnalysis(name_interval, table_interval, numbering) if report else self
-        )
-        self.bound_cache: dict[tuple[int, int], tuple[Constraints, Interval]] = {}
+        self.without_reports = RangeAnalysis(name_interval, table_interval) if report else self
         self.branch_path: list[tuple[SyntaxTree, bool]] = []
 
     def analyse(self, tree: SyntaxTree) -> Interval:
@@ -81,7 +74,6 @@ class RangeAnalysis:
         Calls `report` for each divisor that may be 0 and each argument of `sqrt`, `log` or `pow`
         that may be outside of its domain, certain or not, from the inside out.
         """
-        self.without_reports.bound_cache.clear()
         before, self.branch_path = self.branch_path, []
         interval = self.interval_of(tree, NO_CONSTRAINTS)
         self.branch_path = before
@@ -99,7 +91,7 @@ class RangeAnalysis:
                     self.interval_of(part, constraints)
             return UNBOUNDED
         interval = self._compute_interval(tree, constraints)
-        held = constraints.get(self.numbering.number_of(tree)) if constraints else None
+        held = constraints.get(tree) if constraints else None
         return interval.intersect(held) if held else interval
 
     def _compute_interval(self, tree: SyntaxTree, constraints: Constraints) -> Interval:
@@ -119,8 +111,9 @@ class RangeAnalysis:
             case Conditional(condition, then, other, _):
                 if self.report:
                     self.interval_of(condition, constraints)
-                held = self._branch_interval(condition, True, then, constraints)
-                return held.hull(self._branch_interval(condition, False, other, constraints))
+                where_true, where_false = self._constraints_of(condition, constraints)
+                held = self._branch_interval(condition, True, then, where_true)
+                return held.hull(self._branch_interval(condition, False, other, where_false))
             case FunctionCall():
                 return self._call(tree, constraints)
         return UNBOUNDED
@@ -128,12 +121,12 @@ class RangeAnalysis:
     def _branch_interval(
         self, condition: SyntaxTree, holds: bool, tree: SyntaxTree, constraints: Constraints
     ) -> Interval:
-        """Return the interval of the alternative `tree` of a choice.
+        """Return the interval of the alternative `tree` of a choice under its constraints.
 
         The condition is true there if `holds` is true, else false.
         """
         self.branch_path.append((condition, holds))
-        interval = self.interval_of(tree, self._assume(condition, holds, constraints))
+        interval = self.interval_of(tree, constraints)
         self.branch_path.pop()
         return interval
 
@@ -150,7 +143,7 @@ class RangeAnalysis:
             case "-":
                 return Interval(left.low - right.high, left.high - right.low, known)
             case "*":
-                if is_same_expression(tree.left, tree.right):
+                if tree.left == tree.right:
                     return even_power(left, 2)
                 return image_of_corners(left, right, lambda a, b: a * b)
         if right.contains_zero and self.report:
@@ -199,52 +192,36 @@ class RangeAnalysis:
                 self.report(kind, tree.arguments[0], parts[0])
         return function_image(name, parts)
 
-    def _assume(self, condition: SyntaxTree, holds: bool, constraints: Constraints) -> Constraints:
-        """Return the constraints where a condition is true, or false if `holds` is false.
+    def _constraints_of(
+        self, condition: SyntaxTree, constraints: Constraints
+    ) -> tuple[Constraints, Constraints]:
+        """Return the constraints where a condition is true, and those where it is false.
 
         Of a disjunction only the constraints that both sides impose are kept, as hulls.
         """
         match condition:
             case Not(operand, _):
-                return self._assume(operand, not holds, constraints)
-            case Logic(operator, left, right, _) if (operator == "and") == holds:
-                return self._assume(right, holds, self._assume(left, holds, constraints))
+                where_true, where_false = self._constraints_of(operand, constraints)
+                return where_false, where_true
+            case Logic("and", left, right, _):
+                where_left, first_false = self._constraints_of(left, constraints)
+                where_both, second_false = self._constraints_of(right, where_left)
+                return where_both, _either(first_false, second_false)
             case Logic(_, left, right, _):
-                either = self._assume(left, holds, constraints)
-                other = self._assume(right, holds, self._assume(left, not holds, constraints))
-                return {key: either[key].hull(other[key]) for key in either if key in other}
-            case Relation(operator, left, right, _) if operator not in ("==", "!="):
-                operator = operator if holds else NEGATED_RELATION[operator]
-                first, second = (
-                    self.without_reports.bound_of(left, constraints),
-                    self.without_reports.bound_of(right, constraints),
-                )
-                constraints = self._constrain_by_relation(left, operator, second, constraints)
-                return self._constrain_by_relation(
-                    right, FLIPPED_RELATION[operator], first, constraints
-                )
-            case Relation(operator, left, right, _) if operator in ("==", "!="):
-                sides = (
-                    self.without_reports.bound_of(left, constraints),
-                    self.without_reports.bound_of(right, constraints),
-                )
-                bounded = (
-                    self._constrain_equal
-                    if (operator == "==") == holds
-                    else self._constrain_unequal
-                )
-                return bounded(right, sides[0], bounded(left, sides[1], constraints))
-        return constraints
+                first_true, where_not_left = self._constraints_of(left, constraints)
+                second_true, where_neither = self._constraints_of(right, where_not_left)
+                return _either(first_true, second_true), where_neither
+            case Relation(operator, left, right, _):
+                first = self.without_reports.interval_of(left, constraints)
+                second = self.without_reports.interval_of(right, constraints)
 
-    def bound_of(self, side: SyntaxTree, constraints: Constraints) -> Interval:
-        """Return the interval of one side of a relation, as `interval_of`.
+                def where(operator: str) -> Constraints:
+                    flipped = FLIPPED_RELATION[operator]
+                    inner = self._constrain_by_relation(left, operator, second, constraints)
+                    return self._constrain_by_relation(right, flipped, first, inner)
 
-        It is cached by the identity of both arguments, as both outcomes of the relation need it.
-        """
-        key = id(side), id(constraints)
-        if key not in self.bound_cache:
-            self.bound_cache[key] = constraints, self.interval_of(side, constraints)
-        return self.bound_cache[key][1]
+                return where(operator), where(NEGATED_RELATION[operator])
+        return constraints, constraints
 
     def _constrain_by_relation(
         self, side: SyntaxTree, operator: str, bound: Interval, constraints: Constraints
@@ -252,46 +229,35 @@ class RangeAnalysis:
         """Return the constraints where `side operator x` is true for some x within `bound`.
 
         A strict relation excludes the bound itself; `abs(x) > a` with a >= 0 excludes 0 from x.
+        Of the relations `!=` only `!= 0` adds a constraint: it excludes 0.
         """
-        low, high = -math.inf, math.inf
-        if operator == ">":
-            low = math.nextafter(bound.low, math.inf)
-        elif operator == ">=":
-            low = bound.low
-        elif operator == "<":
-            high = math.nextafter(bound.high, -math.inf)
-        else:
-            high = bound.high
-        made = self._constrain(side, Interval(low, high), constraints)
-        if isinstance(side, FunctionCall) and side.function == "abs" and low > 0.0:
-            return self._constrain(side.arguments[0], Interval(excludes_zero=True), made)
+        match operator:
+            case ">":
+                held = Interval(low=math.nextafter(bound.low, math.inf))
+            case ">=":
+                held = Interval(low=bound.low)
+            case "<":
+                held = Interval(high=math.nextafter(bound.high, -math.inf))
+            case "<=":
+                held = Interval(high=bound.high)
+            case "==":
+                held = Interval(bound.low, bound.high, excludes_zero=bound.excludes_zero)
+            case _ if bound.low == bound.high == 0.0:
+                held = Interval(excludes_zero=True)
+            case _:
+                return constraints
+        made = _constrain(side, held, constraints)
+        is_above = operator in (">", ">=") and held.low > 0.0
+        if is_above and isinstance(side, FunctionCall) and side.function == "abs":
+            return _constrain(side.arguments[0], Interval(excludes_zero=True), made)
         return made
 
-    def _constrain_equal(
-        self, side: SyntaxTree, bound: Interval, constraints: Constraints
-    ) -> Constraints:
-        """Return the constraints where a side equals a value within `bound`."""
-        return self._constrain(
-            side, Interval(bound.low, bound.high, excludes_zero=bound.excludes_zero), constraints
-        )
 
-    def _constrain_unequal(
-        self, side: SyntaxTree, bound: Interval, constraints: Constraints
-    ) -> Constraints:
-        """Return the constraints where a side differs from a value within `bound`.
+def _constrain(side: SyntaxTree, bound: Interval, constraints: Constraints) -> Constraints:
+    """Return the constraints with the interval of a side intersected with `bound`."""
+    return {**constraints, side: constraints.get(side, UNBOUNDED).intersect(bound)}
 
-        Only `!= 0` adds a constraint: it excludes 0.
-        """
-        is_zero = bound.low == bound.high == 0.0
-        return (
-            self._constrain(side, Interval(excludes_zero=True), constraints)
-            if is_zero
-            else constraints
-        )
 
-    def _constrain(
-        self, side: SyntaxTree, bound: Interval, constraints: Constraints
-    ) -> Constraints:
-        """Return the constraints with the interval of a side intersected with `bound`."""
-        number = self.numbering.number_of(side)
-        return {**constraints, number: constraints.get(number, UNBOUNDED).intersect(bound)}
+def _either(first: Constraints, second: Constraints) -> Constraints:
+    """Return the constraints that both of two sets impose, as hulls."""
+    return {key: first[key].hull(second[key]) for key in first if key in second}

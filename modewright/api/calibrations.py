@@ -12,10 +12,10 @@ from codegen.exchange.calibration.calibration_page import (
     page_name,
 )
 from codegen.exchange.calibration.characteristic import PageFile
-from codegen.exchange.calibration.formats import FORMATS, read_page
-from codegen.exchange.calibration.import_context import Remark
+from codegen.exchange.calibration.file_formats import FORMATS, read_page
 from codegen.exchange.calibration.name_filter import NameFilter
 from codegen.exchange.calibration.page_import import ImportedValues, import_values
+from codegen.exchange.calibration.value_conversion import Remark
 from language.ir.program import Constant, Program
 from language.loading.load import automaton_of, program_of
 from language.model.automaton import Automaton

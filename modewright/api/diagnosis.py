@@ -15,20 +15,20 @@ from diagnosis.criterion.threshold import (
     format_thresholds,
     read_thresholds,
 )
-from diagnosis.data.file_names import recording_names
 from diagnosis.data.holdout import require_disjoint
+from diagnosis.data.recording_names import recording_names
+from diagnosis.data_quality.finding import format_findings
+from diagnosis.data_quality.recording_check import used_columns
 from diagnosis.model.effect_folder import explain_unplaceable, load_effects
 from diagnosis.model.effect_library import library_effects
-from diagnosis.pipeline.case import BootstrapMode, Case, file_digests
 from diagnosis.pipeline.diagnose import diagnose as run_diagnosis
+from diagnosis.pipeline.diagnosis_case import BootstrapMode, Case, file_digests
 from diagnosis.pipeline.parameter_fit import Fit, fit as fit_case
 from diagnosis.pipeline.usable_recordings import LazyRecordings, select_usable
-from diagnosis.quality.finding import format_findings
-from diagnosis.quality.recording import used_columns
 from diagnosis.report.diagnosis_report import DiagnosisReport, undecided_verdict, unusable_reasons
-from diagnosis.report.sentences import summary_lines
+from diagnosis.report.negative_fit_signals import unfollowed_signals, withdraw_nothing_missing
+from diagnosis.report.report_text import summary_lines
 from diagnosis.report.stale_files import find_stale_files
-from diagnosis.report.unfollowed_signals import unfollowed_signals, withdraw_nothing_missing
 from diagnosis.report.variant_file import format_variant, missing_effect_notes
 from engine.recordings.recording import read_recording
 from engine.recordings.recording_window import strip_window_suffix
@@ -38,7 +38,7 @@ from language.overlays.effect_reader import Effect
 from language.overlays.expand_document import Project, display_path, expand_document, read_document
 from modewright.api.recordings import CheckedRecordings, check_recordings, held_out_findings
 from modewright.runtime.blas_threads import SingleThreadedBlas
-from modewright.runtime.gc_pause import infrequent_gc
+from modewright.runtime.gc_threshold import infrequent_gc
 from modewright.runtime.output_files import OutputError, make_folder, remove_files, write_files
 
 Report = Callable[[str], None]
@@ -222,7 +222,7 @@ def save_diagnosis(report: DiagnosisReport, out: str | Path, spec: str) -> list[
     and effects that the diagnosis read. Checkpoints are removed unless the diagnosis was ended
     early. `spec` is the name or path of the base. Raises OutputError.
     """
-    from diagnosis.report.page import report_files
+    from diagnosis.report.report_files import report_files
 
     folder = Path(out)
     make_folder(folder)

@@ -11,21 +11,25 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from diagnosis.data.file_names import distinguish_file_names
-from diagnosis.pipeline.case import Case
-from diagnosis.quality.clock_search import find_clock_and_sign_errors
-from diagnosis.quality.column_guess import guess_map
-from diagnosis.quality.finding import format_findings
-from diagnosis.quality.recording import RecordingCheck, check_recordings as run_checks, used_columns
+from diagnosis.data.recording_names import distinguish_file_names
+from diagnosis.data_quality.column_hypothesis import find_clock_and_sign_errors
+from diagnosis.data_quality.finding import format_findings
+from diagnosis.data_quality.recording_check import (
+    RecordingCheck,
+    check_recordings as run_checks,
+    used_columns,
+)
+from diagnosis.data_quality.recording_map_inference import guess_map
+from diagnosis.pipeline.diagnosis_case import Case
 from engine.recordings.recording import Recording, read_recording
 from language.loading.load import automaton_of
-from language.loading.map_pairing import check_pairing
+from language.loading.recording_map_columns import check_pairing
 from language.loading.recording_map_reader import read_map
 from language.model.automaton import Automaton
 from language.model.system import RecordingMap
 from language.overlays.expand_document import Project, expand_document, read_document
 from language.text.diagnostic import MissingToolError, Problems, SpecError
-from modewright.runtime.compiled_run import simulate_resolved
+from modewright.runtime.back_end_choice import simulate_resolved
 
 if TYPE_CHECKING:
     from engine.results.plot import Picture
@@ -51,7 +55,7 @@ class CheckedRecordings:
 
         An empty title is replaced by the names of the recordings, separated by `, `.
         """
-        from diagnosis.quality.recording_picture import draw_recordings
+        from diagnosis.data_quality.recording_figure import draw_recordings
 
         names = ", ".join(recording.name for recording in self.recordings)
         return draw_recordings(self.recordings, self.check, title or names)

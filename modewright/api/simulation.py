@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from codegen.toolchain.compiler import flags_at_level
-from codegen.toolchain.machine import CORTEX_M4F, HOST, MACHINES
+from codegen.toolchain.target_machine import CORTEX_M4F, HOST, MACHINES
 from engine.recordings.recording import Recording, read_recording
 from engine.results.trajectory import Trajectory
 from engine.simulation.replay import Replay, replay as replay_recording, used_columns
@@ -36,10 +36,10 @@ from language.overlays.expand_document import (
 from language.text.diagnostic import Problems, SpecError
 from language.text.document import require_kind
 from lockstep.comparison import Verdict, add_instruction_counts, compare
-from lockstep.comparison_notes import add_notes
+from lockstep.comparison_scope import add_notes
 from lockstep.tick_log import TickLog, record_ticks
 from modewright.api.documents import Values, load_calibrated_document, parse_values
-from modewright.runtime.compiled_run import run_simulation as run_compiled
+from modewright.runtime.back_end_choice import run_simulation as run_compiled
 
 METHODS = ("RK4", "DOP853", "Radau", "LSODA")
 """Integration methods of continuous automata: RK4 of the Program, or methods of scipy."""

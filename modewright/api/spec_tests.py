@@ -12,13 +12,13 @@ import numpy as np
 from engine.results.trajectory import Trajectory
 from engine.simulation.simulate import simulate
 from expectation.evaluate_expectations import Outcome, evaluate_test
+from expectation.expectation_reader import read_test
 from expectation.expectations import Test
-from expectation.test_reader import read_test
 from language.overlays.expand_document import Project
 from language.text.diagnostic import Problems, Source, Span, SpecError
 from language.text.project_files import HEAD_PATTERN
-from modewright.api.checking import spec_files
-from modewright.runtime.compiled_run import run_in_c
+from modewright.api.spec_check import spec_files
+from modewright.runtime.back_end_choice import run_in_c
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from language.loading.load import command_line_value
 from language.overlays.expand_document import Project, read_document
 from language.text.diagnostic import MissingToolError, Problems, render_problem, sort_problems
 from language.text.document import ScalarNode
-from modewright.runtime.compiled_run import run_block
+from modewright.runtime.back_end_choice import run_block
 from modewright.runtime.output_files import OutputError
 from sweep.analysis.summary import Summary, summary_of
 from sweep.definition.override_check import require_overridable
@@ -25,7 +25,7 @@ from sweep.execution import fork_server
 from sweep.execution.dask_address import Address, Credentials, parse_address
 from sweep.execution.executor import Executor, SerialExecutor
 from sweep.execution.prepare_study import prepare_study, resample_study
-from sweep.execution.processes import ProcessExecutor
+from sweep.execution.process_executor import ProcessExecutor
 from sweep.execution.study_run import Progress, StudyRun, Warn, run_study
 from sweep.store.store import read_store
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 WORKER_COMMAND = (sys.executable, "-P", "-m", "modewright.workers.study_worker")
 """The command that starts a worker process."""
 
-TEMPLATE_MODULE = "modewright.workers.dask_template"
+TEMPLATE_MODULE = "modewright.workers.preloaded_modules"
 """The module that the fork server loads for the workers of a local cluster."""
 
 
@@ -130,7 +130,7 @@ def _cluster_executor(place: Address, credentials: Credentials) -> Iterator[Exec
     except ImportError:
         advice = "pip install 'modewright[cluster]'"
         raise MissingToolError(f"a cluster needs the package `distributed`: {advice}") from None
-    from modewright.workers import dask_worker as cluster_worker
+    from modewright.workers import dask_entry_points as cluster_worker
 
     staff = WorkerSetup(cluster_worker.own_fingerprint, cluster_worker.__name__)
     with open_client(place, credentials, staff) as client:

@@ -48,7 +48,7 @@ from modewright.cli.commands.test import test
 from modewright.cli.commands.trace import trace
 from modewright.cli.common.console import configure
 from modewright.cli.common.exit_codes import EXIT_CODES, INTERRUPTED, run_with_exit_code
-from modewright.runtime.gc_pause import raise_gc_threshold
+from modewright.runtime.gc_threshold import raise_gc_threshold
 from modewright.runtime.output_files import require_writable
 
 MULTI_VALUE_OPTIONS = ("--train", "--held-out")

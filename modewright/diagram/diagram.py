@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from language.reading.transition_table_reader import expand_transition_tables
+from language.readers.transition_table_reader import expand_transition_tables
 from language.text.diagnostic import Problems
 from language.text.document import Document, Entry, MappingNode, SequenceNode, YamlNode
 from language.text.overlay import apply_overlay, without_keys
-from modewright.diagram.boxes import Arrow, ModeBox, ModePath, RegionBox
+from modewright.diagram.diagram_elements import Arrow, ModeBox, ModePath, RegionBox
 from modewright.diagram.label_text import label_lines, mode_kind_of, mode_lines, node_text
 
 

@@ -50,7 +50,7 @@ class Layout:
     size: Size
 
 
-@dataclass
+@dataclass(eq=False)
 class _Item:
     """An item of a column: a box, a label, or a point through which an edge passes."""
 
@@ -149,13 +149,13 @@ def _reduce_crossings(columns: list[list[_Item]]) -> None:
     for sweep in range(SWEEPS):
         forward = sweep % 2 == 0
         for column in columns if forward else reversed(columns):
-            place = {id(item): k for each in columns for k, item in enumerate(each)}
+            place = {item: k for each in columns for k, item in enumerate(each)}
             means = {}
             for k, item in enumerate(column):
                 beside = item.before if forward else item.after
-                own = [place[id(other)] for other in beside]
-                means[id(item)] = sum(own) / len(own) if own else float(k)
-            column.sort(key=lambda item: means[id(item)])
+                own = [place[other] for other in beside]
+                means[item] = sum(own) / len(own) if own else float(k)
+            column.sort(key=lambda item: means[item])
         count = _count_crossings(columns)
         if count < fewest:
             best, fewest = [list(column) for column in columns], count
@@ -164,10 +164,10 @@ def _reduce_crossings(columns: list[list[_Item]]) -> None:
 
 def _count_crossings(columns: Sequence[Sequence[_Item]]) -> int:
     """Return the number of crossings of edges between neighbouring columns."""
-    place = {id(item): k for column in columns for k, item in enumerate(column)}
+    place = {item: k for column in columns for k, item in enumerate(column)}
     total = 0
     for column in columns:
-        lines = [(place[id(a)], place[id(b)]) for a in column for b in a.after]
+        lines = [(place[a], place[b]) for a in column for b in a.after]
         for k, (a, b) in enumerate(lines):
             total += sum((a - c) * (b - d) < 0 for c, d in lines[:k])
     return total

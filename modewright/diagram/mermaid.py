@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 
 from language.text.sanitise import escape_invisible
-from modewright.diagram.boxes import Arrow, ModeBox, ModePath, RegionBox, lift_arrow
+from modewright.diagram.diagram_elements import Arrow, ModeBox, ModePath, RegionBox, lift_arrow
 
 RESERVED = frozenset({"state", "note", "end", "direction", "class", "click", "hide", "scale", "as"})
 """Words of Mermaid that cannot be identifiers."""

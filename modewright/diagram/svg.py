@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from html import escape
 
 from language.text.sanitise import escape_invisible
-from modewright.diagram.boxes import Arrow, ModeBox, RegionBox, lift_arrow
+from modewright.diagram.diagram_elements import Arrow, ModeBox, RegionBox, lift_arrow
 from modewright.diagram.layered_layout import Edge, Layout, Point, Size, compute_layout
 
 CHARACTER_WIDTH, LINE_HEIGHT, TITLE_HEIGHT = 7.0, 14.0, 20.0

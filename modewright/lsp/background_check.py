@@ -12,7 +12,7 @@ from pathlib import Path
 
 from lsprotocol import converters, types
 
-from modewright.api.checking import check_spec
+from modewright.api.spec_check import check_spec
 from modewright.lsp.diagnostics import to_diagnostics
 from modewright.lsp.workspace import Workspace
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from lsprotocol import types
 
 from language.text.diagnostic import Problem
-from modewright.api.checking import CheckResult, check_without_proofs
+from modewright.api.spec_check import CheckResult, check_without_proofs
 from modewright.lsp.positions import range_of, uri_of
 from modewright.lsp.workspace import Workspace
 

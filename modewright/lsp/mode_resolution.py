@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 from modewright.lsp.symbol_table import Symbol, SymbolTable, mode_path
 
 NamePart = tuple[int, str]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 from language.text.diagnostic import Span
 from modewright.lsp.mode_resolution import NamePart, Resolution, resolve_mode_parts, split_name
 from modewright.lsp.name_occurrence import QUERIED_KINDS, NameOccurrence

@@ -7,7 +7,7 @@ from pathlib import Path
 from lsprotocol import types
 
 from language.expressions.name_rules import check_name
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 from language.overlays.expand_document import display_path
 from language.text.diagnostic import Problems
 from modewright.lsp.hover import reference_at

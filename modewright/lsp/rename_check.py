@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from language.text.diagnostic import Problem, Span
-from modewright.api.checking import check_without_proofs
+from modewright.api.spec_check import check_without_proofs
 from modewright.lsp.reference import references_to
 from modewright.lsp.symbol_table import Symbol
 from modewright.lsp.workspace import Workspace

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 from language.text.diagnostic import Span
 from language.text.document import Document, Entry, MappingNode, ScalarNode
 from language.text.node_edit import mapping_entries

@@ -9,14 +9,14 @@ from rich.console import Console
 from rich.markup import escape
 
 from codegen.exchange.calibration.calibration_page import format_constant_value, page_name
-from codegen.exchange.calibration.import_context import Remark
+from codegen.exchange.calibration.value_conversion import Remark
 from language.expressions.units import display_unit
 from language.ir.program import Constant, unqualified_name
 from language.text.diagnostic import Problem, render_all
 from language.text.sanitise import escape_invisible
 from modewright.api.calibrations import CalibrationPage, ImportedPage, ResolvedPage, SolvedChange
-from modewright.api.checking import problem_json
-from modewright.render.text import pluralise
+from modewright.api.spec_check import problem_json
+from modewright.render.pluralisation import pluralise
 from modewright.runtime.json_format import format_entry
 
 MAX_SHOWN = 12

@@ -9,7 +9,7 @@ from rich.table import Table
 
 from diagnosis.pipeline.parameter_fit import STRONG_CORRELATION, Fit
 from diagnosis.report.diagnosis_report import DiagnosisReport, replace_non_finite
-from diagnosis.report.sentences import format_two_digits, summary_lines
+from diagnosis.report.report_text import format_two_digits, summary_lines
 from modewright.runtime.json_format import format_entry
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from expectation.key_trace import KeyTrace, KeyTraces
 from expectation.requirement_trace import CodeLine
-from modewright.render.text import pluralise
+from modewright.render.pluralisation import pluralise
 from modewright.runtime.json_format import format_entry
 
 STYLE = """body{font:13px/1.4 system-ui,sans-serif;margin:0;color:#222;height:100vh;display:flex;

@@ -10,10 +10,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from diagnosis.quality.channel import ChannelCheck
-from diagnosis.quality.excitation import Excitation
-from diagnosis.quality.finding import format_findings
-from diagnosis.quality.recording import RecordingCheck
+from diagnosis.data_quality.channel import ChannelCheck
+from diagnosis.data_quality.excitation import Excitation
+from diagnosis.data_quality.finding import format_findings
+from diagnosis.data_quality.recording_check import RecordingCheck
 from modewright.render.run import nonfinite_to_none
 from modewright.runtime.json_format import format_entry
 

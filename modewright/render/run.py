@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from engine.results.run_comparison import ModeSequence, RunDifference
-from engine.results.samples import Event
+from engine.results.sampled_run import Event
 from engine.results.trajectory import Trajectory
 from lockstep.comparison import Verdict
 from modewright.api.doctor import HealthCheck

@@ -11,7 +11,7 @@ from expectation.expectations import Expectation
 from language.expressions.units import Dimension
 from language.text.sanitise import escape_invisible
 from modewright.api.spec_tests import TestRun
-from modewright.render.text import pluralise
+from modewright.render.pluralisation import pluralise
 
 XML_DECLARATION = "<?xml version='1.0' encoding='utf-8'?>"
 SECONDS_DECIMALS = 3

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from modewright.runtime.compiled_run import run_block
+from modewright.runtime.back_end_choice import run_block
 from sweep.execution.worker import serve_blocks
 
 

@@ -18,7 +18,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.measurement.exact_moments import quantiles_of, scale_to_squarable, undo_scale
+from sweep.evaluation.exact_moments import quantiles_of, scale_to_squarable, undo_scale
 
 Interval = tuple[float, float] | None
 Reals = NDArray[np.float64]

@@ -22,7 +22,7 @@ from sweep.analysis.summary import group_values
 from sweep.definition.measure import StoreColumn
 from sweep.definition.study import MORRIS_LEVELS
 from sweep.design.sensitivity_design import STRIDE, morris_points
-from sweep.measurement.exact_moments import scale_to_squarable
+from sweep.evaluation.exact_moments import scale_to_squarable
 from sweep.store.manifest import Design, store_error
 from sweep.store.store import Store
 from sweep.store.table import Reals, StudyTable

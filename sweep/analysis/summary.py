@@ -25,7 +25,7 @@ from sweep.analysis.confidence_interval import (
     sum_by_draw,
 )
 from sweep.definition.measure import StoreColumn
-from sweep.measurement.exact_moments import deviation_of, mean_of, quantiles_of, total_of
+from sweep.evaluation.exact_moments import deviation_of, mean_of, quantiles_of, total_of
 from sweep.store.store import Store
 from sweep.store.table import Reals, StudyTable, to_display_unit
 

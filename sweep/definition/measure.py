@@ -11,7 +11,7 @@ from fractions import Fraction
 from typing import Literal
 
 from language.expressions.units import display_unit
-from language.loading.event_names import ModeEntryEvent
+from language.loading.mode_entry_event import ModeEntryEvent
 from language.model.declaration import Formula
 from language.text.diagnostic import Span
 

@@ -16,16 +16,16 @@ from language.expressions.units import (
     are_compatible,
     dimension_product,
 )
-from language.loading.event_names import ModeEntryEvent, read_event
+from language.loading.mode_entry_event import ModeEntryEvent, read_event
 from language.loading.signal_types import signal_types
 from language.model.declaration import Formula
 from language.model.system import System
-from language.reading.difference_literal import read_difference
-from language.reading.reader import Reader
+from language.readers.base_reader import Reader
+from language.readers.difference_literal import read_difference
 from language.text.diagnostic import Problems, Span, suggest_name
 from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
-from language.typecheck.environment import NameEnvironment
 from language.typecheck.infer import TypeChecker
+from language.typecheck.name_environment import NameEnvironment
 from language.typecheck.types import ExprType, IntType
 from sweep.definition.measure import (
     Bound,

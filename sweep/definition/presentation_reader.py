@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from language.reading.reader import Reader
+from language.readers.base_reader import Reader
 from language.text.diagnostic import Problems, suggest_name
 from language.text.document import Entry, ScalarNode, YamlNode
 from sweep.definition.measure import Measure, columns_of

@@ -7,7 +7,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import accumulate
 
-from language.reading.reader import Reader
+from language.readers.base_reader import Reader
 from language.text.document import ScalarNode, YamlNode
 from sweep.definition.study import (
     MORRIS_LEVELS,

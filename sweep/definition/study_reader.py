@@ -14,7 +14,7 @@ from language.loading.scenario_reader import read_scenario
 from language.loading.system_reader import Overrides, read_system, single_instance_system
 from language.model.system import Scenario, System
 from language.overlays.expand_document import Project, expand_document
-from language.reading.reader import TEXT_KEYS, Reader
+from language.readers.base_reader import TEXT_KEYS, Reader
 from language.text.diagnostic import Problems, Span, suggest_name
 from language.text.document import (
     Document,
@@ -26,14 +26,14 @@ from language.text.document import (
     require_kind,
 )
 from language.text.node_edit import put_node
+from sweep.definition.assignment_target import TargetInfo, find_targets
 from sweep.definition.description import description_of
 from sweep.definition.measure import Measure, SignalMeasure
 from sweep.definition.measure_reader import MeasureReader
 from sweep.definition.presentation_reader import PresentationReader
 from sweep.definition.sampling_reader import MAX_POINTS, SamplingReader
 from sweep.definition.study import ScenarioBinding, Setting, Study, SweepVariable, SystemVariant
-from sweep.definition.target import TargetInfo, find_targets
-from sweep.definition.vary_reader import VaryReader
+from sweep.definition.sweep_variable_reader import VaryReader
 
 STUDY_KEYS = (
     *("language", "study", "of", "scenarios", "variants", "vary", "set", "sampling"),

@@ -35,8 +35,8 @@ def variant_values_of(study: Study, variant: Variant) -> VariantValues:
 
     A setting is skipped if it reads a name that is neither a variable with a value nor a parameter.
     Targets that the system variant does not have are left out. `refusal` tells of the first value
-    that is not finite, out of the range of its parameter, or a time that is not positive (an
-    offset: negative).
+    that is not finite, out of the range of its parameter, a negative stage of a sensor or offset,
+    or a period or step that is not positive.
     """
     kind = study.system_variants[variant.system_variant]
     scenario = kind.scenario_bindings[study.scenarios[variant.scenario]].scenario
@@ -124,8 +124,8 @@ def parameter_value(system: System, name: str, target_values: Mapping[Target, fl
 def _find_refusal(system_variant: SystemVariant, values: Mapping[Target, float]) -> str:
     """Return the reason why values are invalid; empty if they are valid.
 
-    A value must be finite; a parameter must be in its range; a time must be positive (an offset
-    zero or positive).
+    A value must be finite and a parameter in its range. Values of sensors and clocks must not be
+    negative, and periods and steps must be positive; a stage of a sensor that is 0 is absent.
     """
     for target, value in values.items():
         name = ".".join(target.path)
@@ -137,7 +137,9 @@ def _find_refusal(system_variant: SystemVariant, values: Mapping[Target, float])
             low, high = map(float, limits) if limits else (-math.inf, math.inf)
             if not low <= value <= high:
                 return f"`{name}` = {value:.6g} is outside its range [{low:.6g}, {high:.6g}]"
-        is_positive = target.kind == "sensor" or target.path[-1] in ("period", "step")
-        if target.kind in ("sensor", "clock") and (value < 0 or (is_positive and value == 0)):
-            return f"`{name}` = {value:.6g} is not above zero"
+        if target.kind in ("sensor", "clock"):
+            if target.path[-1] in ("period", "step") and value <= 0:
+                return f"`{name}` = {value:.6g} is not above zero"
+            if value < 0:
+                return f"`{name}` = {value:.6g} is below zero"
     return ""

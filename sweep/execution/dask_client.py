@@ -16,7 +16,7 @@ from sweep.execution.dask_address import Address, Credentials
 from sweep.execution.dask_error import ClusterError
 from sweep.execution.fingerprint import describe_differences, fingerprint
 from sweep.execution.fork_server import start_method
-from sweep.execution.processes import MAX_DEATHS
+from sweep.execution.process_executor import MAX_DEATHS
 
 CONNECT_TIMEOUT = 30.0
 """Longest time [s] until a scheduler answers, and until the first worker joins."""

@@ -22,7 +22,7 @@ from sweep.execution.dask_error import ClusterError
 from sweep.execution.dask_worker import Answer, pack_study
 from sweep.execution.executor import BlockResult
 from sweep.execution.fingerprint import fingerprint
-from sweep.execution.processes import WorkerError
+from sweep.execution.process_executor import WorkerError
 from sweep.store.row import Block
 
 BlockTask = Callable[[Mapping[str, str], bytes, int, int], Answer]

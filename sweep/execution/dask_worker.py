@@ -15,7 +15,7 @@ from functools import lru_cache
 
 from engine.batch.batch import BatchRunner
 from sweep.definition.study import Study
-from sweep.execution.block import compute_rows
+from sweep.execution.block_computation import compute_rows
 from sweep.execution.fingerprint import describe_differences, fingerprint
 from sweep.execution.prepare_study import program_digests
 from sweep.store.block_file import encode_block

@@ -8,7 +8,7 @@ from typing import Protocol
 
 from engine.batch.batch import BatchRunner
 from sweep.definition.study import Study
-from sweep.execution.block import compute_rows
+from sweep.execution.block_computation import compute_rows
 from sweep.store.row import Block, Row
 
 

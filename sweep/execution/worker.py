@@ -18,7 +18,7 @@ import traceback
 from typing import IO, Any
 
 from engine.batch.batch import BatchRunner
-from sweep.execution.block import compute_rows
+from sweep.execution.block_computation import compute_rows
 from sweep.store.block_file import encode_block
 from sweep.store.manifest import manifest_of
 from sweep.store.row import Block

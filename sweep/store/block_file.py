@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from types import ModuleType
 from typing import Any, Literal
 
-from engine.results.parquet import import_pyarrow
+from engine.results.pyarrow_import import import_pyarrow
 from sweep.store.manifest import ARROW_TYPES, Manifest
 from sweep.store.row import Block, Row
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from sweep.measurement.evaluate_measures import Cell
+from sweep.evaluation.evaluate_measures import Cell
 
 DONE, FAULT, STOPPED, REFUSED = "done", "fault", "stopped", "refused"
 """Status of a variant: finished; a fault bit is set; the run stopped; it cannot be simulated."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from codegen.simulator.simulator_library import load_library
 from engine.batch.batch import Batch, SignalStatistic
 from engine.batch.compiled_batch import CompiledBatch
-from tests.benchmark import c_rival as in_c, modewright_run as ours
+from tests.benchmark import hand_written_c as in_c, modewright_run as ours
 from tests.benchmark.manoeuvre import NOMINAL, Manoeuvre
 
 PARTS = {"m": 0.2, "J_em": 0.2, "k_hs": 0.2, "c_hs": 0.15, "alpha": 0.3}

@@ -17,7 +17,7 @@ from codegen.toolchain.build_cache import cache_folder
 from diagnosis.model import compile_cache as recipe
 from diagnosis.report.diagnosis_report import replace_non_finite
 from diagnosis.result.verdict import Verdict
-from tests.language.build import ROOT
+from tests.language.spec_builders import ROOT
 
 SCHEMA = json.loads((ROOT / "spec" / "verdict.schema.json").read_text("utf-8"))
 VALIDATOR = jsonschema.Draft7Validator(SCHEMA)

@@ -12,7 +12,7 @@ import pytest
 
 from modewright.cli.app import app
 from modewright.cli.common.exit_codes import run_with_exit_code
-from tests.language.build import ROOT
+from tests.language.spec_builders import ROOT
 
 SPEC = """\
 language: 1

@@ -13,7 +13,7 @@ from diagnosis.estimation.covariance import quantities_of
 from diagnosis.model.placed_effect import PlacedEffect
 from diagnosis.report.variant_file import format_variant, variant_name
 from language.overlays.expand_document import Project
-from tests.diagnosis.accepted_report import BASE, make_dossier
+from tests.diagnosis.example_report import BASE, make_dossier
 
 NAME = variant_name(BASE)
 RUN = f"""language: 1

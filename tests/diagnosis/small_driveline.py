@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.quality.free_run import simulate_free_run
+from diagnosis.data_quality.output_comparison import simulate_free_run
 from engine.recordings.recording import Channel, Recording
 from language.loading.load import automaton_of, command_line_value
 from language.loading.recording_map_reader import read_map

@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from modewright.cli.app import COMMANDS
+from modewright.editing.key_shape import shapes
+
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = (
     "language", "engine", "codegen", "diagnosis", "sweep", "expectation", "lockstep", "modewright",
@@ -22,7 +25,9 @@ PATH = re.compile(
     rf"`((?:{'|'.join((*PACKAGES, 'spec', 'tests', 'docs', 'tools'))})/[\w./-]*\w/?)`"
 )
 LINK = re.compile(r"\]\(([\w./-]+)(?:#[\w-]+)?\)")
-NAMED_CONSTANT = re.compile(r"`([\w/]+\.py)` \(`(\w+)`\)")
+NAMED_THINGS = re.compile(r"`([\w./-]+)` \(([^)]*`[^)]*)\)")
+"""A file and, in parentheses behind it, names that it contains."""
+CHANGES = "docs/changes.md"
 
 
 def _sub_packages(package: str, depth: int | None = None) -> set[str]:
@@ -65,21 +70,59 @@ def test_the_readme_of_the_tests_names_their_folders() -> None:
 @pytest.mark.parametrize("page", READMES)
 def test_a_readme_says_what_to_touch(page: str) -> None:
     text = (ROOT / page).read_text("utf-8").partition("## To change X, touch Y")[2]
+    assert "(../docs/changes.md)" in text
     for table in text.split("| to change | touch |")[1:]:
         rows = re.findall(r"^\| (.*) \| (.*) \|$", table, re.MULTILINE)
         assert 5 <= len(rows) <= 20
         assert [row for row, answer in rows if not PATH.search(answer)] == []
 
 
-@pytest.mark.parametrize("page", READMES)
+@pytest.mark.parametrize("package", PACKAGES)
+def test_a_change_that_crosses_packages_is_on_the_page_of_changes_alone(package: str) -> None:
+    text = (ROOT / package / "README.md").read_text("utf-8").partition("## To change X")[2]
+    assert [path for path in PATH.findall(text) if not path.startswith(f"{package}/")] == []
+
+
+def test_each_change_has_its_files() -> None:
+    tables = _change_tables("| to add or change")
+    assert len(tables) >= 20
+    for rows in tables:
+        assert [cells[0] for cells in rows if len(cells) != 3] == []
+        assert [cells[0] for cells in rows if not PATH.search(cells[1])] == []
+
+
+def test_each_command_has_the_chain_of_an_option() -> None:
+    (rows,) = _change_tables("| command |")
+    commands = {cells[0].strip("`"): cells[1] for cells in rows}
+    known = {command.__name__ for command in COMMANDS} | {"recording", "calibration"}
+    assert set(commands) == known
+    for name, module in commands.items():
+        assert module.startswith(f"`modewright/cli/commands/{name}.py`")
+
+
+def test_each_mapping_with_keys_has_a_row() -> None:
+    page = (ROOT / CHANGES).read_text("utf-8")
+    assert [name for name in shapes() if f"`{name}`" not in page] == []
+
+
+@pytest.mark.parametrize("page", [*READMES, CHANGES])
 def test_a_name_beside_a_module_is_in_it(page: str) -> None:
     text = (ROOT / page).read_text("utf-8")
     missing = [
         f"{name} in {module}"
-        for module, name in NAMED_CONSTANT.findall(text)
+        for module, note in NAMED_THINGS.findall(text)
+        if (ROOT / module).is_file()
+        for name in re.findall(r"`(\w+)`", note)
         if not re.search(rf"\b{name}\b", (ROOT / module).read_text("utf-8"))
     ]
     assert missing == []
+
+
+def _change_tables(head: str) -> list[list[list[str]]]:
+    """Return the rows of each table of the page of changes that begins with a head, in cells."""
+    page = (ROOT / CHANGES).read_text("utf-8")
+    blocks = [block.splitlines()[2:] for block in page.split("\n\n") if block.startswith(head)]
+    return [[line.strip("| ").split(" | ") for line in block] for block in blocks]
 
 
 def test_the_architecture_page_is_one_page() -> None:

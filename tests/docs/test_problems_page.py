@@ -9,17 +9,18 @@ import pytest
 
 from language.text.diagnostic import render_all
 from language.text.error_codes import CODES
-from tests.semantics.refused.cases import ROOT, cases, problems_of
-from tests.semantics.refused.generated_cases import GENERATED_CASES
-from tests.semantics.refused.kinds import kinds
+from tests.semantics.invalid_specs.cases import ROOT, cases, problems_of
+from tests.semantics.invalid_specs.generated_cases import GENERATED_CASES
+from tests.semantics.invalid_specs.problem_kinds import kinds
 
 PAGE = ROOT / "docs" / "problems.md"
 HEAD = """# Problems and their codes
 
-Each kind of problem has a permanent code. `modewright check` prints it after the message, and
-`--json`, `--sarif` and `--github` contain it. Warnings do not fail a check. The examples are those
-of `tests/semantics/refused/`, where a corrected copy is beside each. This page is generated from
-them (`pytest tests/docs/test_problems_page.py --update`).
+Each kind of problem has a permanent code. `modewright check` prints the code after the message. The
+outputs of `--json`, `--sarif` and `--github` contain the code as well. A warning does not change
+the exit code of a check. The folder `tests/semantics/invalid_specs/` contains the spec of each
+example and a corrected copy of it. `pytest tests/docs/test_problems_page.py --update` generates
+this page.
 """
 TITLES = {
     "1": "Text and files",

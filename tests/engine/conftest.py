@@ -8,13 +8,7 @@ import pytest
 
 from engine.recordings.recording import Recording, read_recording
 from language.text.diagnostic import SpecError
-from tests.engine.written_recordings import (
-    COLUMNS,
-    Read,
-    RenderProblems,
-    render_problems,
-    write_map,
-)
+from tests.engine.recording_files import COLUMNS, Read, RenderProblems, render_problems, write_map
 
 
 @pytest.fixture

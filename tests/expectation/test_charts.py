@@ -16,8 +16,8 @@ from expectation.expectations import Test
 from language.ir.ops import Store
 from language.ir.traversal import walk_ops
 from modewright.api import spec_tests as tests
-from modewright.api.test_coverage import coverage_diagram
-from modewright.diagram.boxes import ModeBox
+from modewright.api.spec_coverage import coverage_diagram
+from modewright.diagram.diagram_elements import ModeBox
 
 CHART = """\
 language: 1

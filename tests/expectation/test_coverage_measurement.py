@@ -24,7 +24,7 @@ from language.ir.traversal import walk_ops
 from language.loading.load import load_automaton
 from language.overlays.expand_document import Project
 from modewright.api import spec_tests as tests
-from modewright.api.test_coverage import coverage_diagram
+from modewright.api.spec_coverage import coverage_diagram
 from modewright.cli.app import app
 from modewright.diagram.svg import SHADE_COLOURS
 from tests.expectation.latch_project import AUTOMATON, HEAD, write_project

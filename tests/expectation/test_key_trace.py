@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from modewright.api.traces import KeyTraceReport, trace_keys
+from modewright.api.traceability import KeyTraceReport, trace_keys
 from modewright.cli.app import app
 from modewright.cli.common.exit_codes import run_with_exit_code
-from tests.language.build import ROOT
+from tests.language.spec_builders import ROOT
 
 
 @pytest.fixture(scope="module")

@@ -11,10 +11,10 @@ import pytest
 from typer.testing import CliRunner
 
 from expectation.requirement_trace import RequirementTrace
-from modewright.api import traces
+from modewright.api import traceability as traces
 from modewright.api.spec_tests import load_test
 from modewright.cli.app import app
-from modewright.render import trace as show_trace
+from modewright.render import requirement_trace as show_trace
 from tests.expectation.latch_project import AUTOMATON, HEAD, write_project
 
 REQUIRED = (

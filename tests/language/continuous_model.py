@@ -8,7 +8,7 @@ from pathlib import Path
 
 from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
-from tests.language.build import program, project_of
+from tests.language.spec_builders import program, project_of
 
 MODEL = """language: 1
 automaton: m

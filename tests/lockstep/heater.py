@@ -7,7 +7,7 @@ from pathlib import Path
 from language.ir.program import Program
 from lockstep.tick_log import TickLog
 from modewright.api.simulation import program
-from tests.lockstep.programs import Tick, record_ticks
+from tests.lockstep.program_strategies import Tick, record_ticks
 
 SPEC = Path(__file__).parents[1] / "codegen" / "emit" / "golden" / "heater.yaml"
 PERIOD = 0.1

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from tests.lockstep.conftest import TICKS
-from tests.lockstep.random_specs.generator_mutants import GENERATOR
+from tests.lockstep.random_specs.codegen_mutants import GENERATOR
+from tests.lockstep.random_specs.interpreter_mutants import INTERPRETER
 from tests.lockstep.random_specs.mutant import Mutant
-from tests.lockstep.random_specs.mutants import INTERPRETER
 from tests.lockstep.random_specs.reference_runs import ReferenceRun, find_killing_spec
 
 pytestmark = pytest.mark.long

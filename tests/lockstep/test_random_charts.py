@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tests.validation.figures.random_charts import measure_part, programs
+from tests.validation.evidence.random_charts import measure_part, programs
 
 COUNT, TICKS = 6, 150
 

@@ -14,7 +14,7 @@ from language.ir.traversal import names_used, walk_ops
 from language.numerics.evaluate import BINARY_OPERATIONS, ELEMENTARY
 from language.numerics.function_table import FUNCTIONS
 from lockstep.comparison import compare
-from tests.lockstep.programs import Tick, programs, record_ticks, ticks
+from tests.lockstep.program_strategies import Tick, programs, record_ticks, ticks
 
 SHARE = 2
 """A program has some fifty expressions: it needs fewer examples than other properties."""

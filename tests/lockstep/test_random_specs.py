@@ -11,10 +11,10 @@ from hypothesis import HealthCheck, given, note, settings, strategies as st
 from language.ir.number_type import NUMBER_TYPES, NumberType
 from lockstep.comparison import compare
 from tests.lockstep.conftest import TICKS
-from tests.lockstep.random_specs.batch import FLAGS
-from tests.lockstep.random_specs.quality import Quality, measure_quality
+from tests.lockstep.random_specs.combined_executable import FLAGS
+from tests.lockstep.random_specs.coverage_requirements import Quality, measure_quality
+from tests.lockstep.random_specs.engine_run import record_ticks
 from tests.lockstep.random_specs.reference_runs import ReferenceRun
-from tests.lockstep.random_specs.running import record_ticks
 from tests.lockstep.random_specs.spec import program
 from tests.lockstep.random_specs.spec_kinds import random_spec
 

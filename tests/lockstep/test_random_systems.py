@@ -8,7 +8,7 @@ from pathlib import Path
 from hypothesis import HealthCheck, given, note, settings
 
 import modewright as mw
-from tests.lockstep.specs import TICKS, Specs, specs
+from tests.lockstep.spec_strategies import TICKS, Specs, specs
 
 SHARE = 10
 """An example costs two compilations."""

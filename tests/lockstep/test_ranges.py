@@ -13,7 +13,7 @@ from lockstep.comparison import compare
 from lockstep.tick_log import TickLog
 from modewright.api.simulation import program
 from tests.lockstep.heater import column
-from tests.lockstep.programs import Tick
+from tests.lockstep.program_strategies import Tick
 
 LOW, HIGH = -1.5, 2.25
 BOUNDS = {name: (LOW, HIGH) for name in "abcdef"} | {"m": (-HIGH, HIGH)}

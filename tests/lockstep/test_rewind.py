@@ -14,9 +14,9 @@ from language.ir.program import Program
 from language.loading.load import load_automaton, program_of
 from language.overlays.expand_document import Project
 from lockstep.tick_log import TickLog
-from tests.language.build import ROOT
-from tests.lockstep.programs import Tick
-from tests.lockstep.random_specs.batch import Batch
+from tests.language.spec_builders import ROOT
+from tests.lockstep.program_strategies import Tick
+from tests.lockstep.random_specs.combined_executable import Batch
 
 TICKS = 1500
 LANE = """\

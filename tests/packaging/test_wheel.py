@@ -244,7 +244,9 @@ def test_the_installed_command_works_in_a_folder_with_our_names(
     assert run([python.parent / "modewright", *arguments], folder)
 
 
-FINGERPRINT = "from modewright.workers.dask_worker import own_fingerprint as f; print(dict(f()))"
+FINGERPRINT = (
+    "from modewright.workers.dask_entry_points import own_fingerprint as f; print(dict(f()))"
+)
 
 
 def test_results_of_the_wheel_are_not_taken_for_those_of_the_repository(

@@ -11,7 +11,7 @@ from engine.batch.batch import Batch, BatchResult
 from sweep.execution.dask_worker import Answer, answer_block
 from sweep.execution.fingerprint import fingerprint
 from sweep.store.row import Block
-from tests.sweep.prepared_studies import quick_results
+from tests.sweep.example_studies import quick_results
 
 
 def answer_quickly(

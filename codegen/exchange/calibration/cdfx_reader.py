@@ -17,7 +17,7 @@ from codegen.exchange.calibration.characteristic import (
     transpose_map,
 )
 from codegen.exchange.calibration.name_filter import NameFilter
-from codegen.exchange.calibration.xml_spans import Element, parse_xml
+from codegen.exchange.calibration.xml_parser import Element, parse_xml
 from language.text.diagnostic import Problems, Source
 
 VALUE_CATEGORIES = ("VALUE", "DEPENDENT_VALUE", "BOOLEAN", "ASCII", "VAL_BLK", "CURVE", "MAP")

@@ -20,15 +20,15 @@ from codegen.exchange.calibration.characteristic import (
     FileCharacteristic,
     PageFile,
 )
-from codegen.exchange.calibration.import_context import (
+from codegen.exchange.calibration.name_filter import NameFilter
+from codegen.exchange.calibration.table_import import read_table
+from codegen.exchange.calibration.value_conversion import (
     ImportContext,
     Remark,
     convert_real,
     convert_to_si,
     resolve_unit,
 )
-from codegen.exchange.calibration.name_filter import NameFilter
-from codegen.exchange.calibration.table_import import read_table
 from language.expressions.units import NO_UNIT, parse_unit
 from language.ir.program import TICK_UNIT, Constant, Program, unqualified_name
 from language.model.automaton import Automaton

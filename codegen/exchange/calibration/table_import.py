@@ -7,7 +7,7 @@ from fractions import Fraction
 from codegen.exchange.calibration.calibration_page import axes_of
 from codegen.exchange.calibration.cell_parser import parse_cell_number
 from codegen.exchange.calibration.characteristic import Cell, FileAxis, FileCharacteristic
-from codegen.exchange.calibration.import_context import (
+from codegen.exchange.calibration.value_conversion import (
     ImportContext,
     convert_real,
     convert_to_si,

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from codegen.exchange.fmi.content import emit_fmu_files, read_headers
+from codegen.exchange.fmi.fmu_files import emit_fmu_files, read_headers
 from codegen.exchange.fmi.variable import Version
 from codegen.toolchain.compiler import (
     FLAGS,

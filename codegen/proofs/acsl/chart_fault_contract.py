@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from codegen.proofs.acsl.chart_predicates import Configuration
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 from language.lowering.fault_mode import FAULT_PRIORITY
 from language.lowering.range_saturation import FAULT_HAPPENED
 from language.model.automaton import Transition

@@ -26,7 +26,7 @@ from language.lowering.edge_detection import (
 )
 from language.lowering.event_queue import CURRENT_EVENT
 from language.lowering.expressions import lower_expression
-from language.lowering.transition_infos import wait_ticks
+from language.lowering.transition_metadata import wait_ticks
 from language.model.automaton import Mode, Transition
 from language.model.statechart import ChartNode
 

@@ -18,7 +18,7 @@ from codegen.proofs.acsl.chart_predicates import Configuration, all_of, any_of
 from language.charts.chart_context import IS_FIRST_STEP, IS_STEP_LIMIT_REACHED
 from language.charts.micro_step import HAS_NEXT_STEP, STEP_COUNT
 from language.ir.program import LOG_COUNT_VARIABLE
-from language.ir.regions import CHART
+from language.ir.root_region import CHART
 from language.lowering.event_queue import CURRENT_EVENT, QUEUE_HEAD, QUEUE_TAIL
 from language.model.automaton import Transition
 from language.model.statechart import ChartTransition

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from codegen.toolchain.compiler import BuildError
 from codegen.toolchain.external_tools import require_tool, run_tool
 
 PROVER = "z3"
@@ -50,14 +51,19 @@ class Asked:
 
 
 def detected(folder: Path) -> None:
-    """Configure why3 in a folder with the installed provers. Raises MissingToolError.
+    """Configure why3 in a folder with the installed provers.
+
+    Raises MissingToolError; BuildError if why3 writes no configuration.
 
     z3 is called by a script with the options SEARCH. Goals contain axioms of the memory model, and
     a search for models of these (MBQI) would take all of the time limit.
     """
     found = shutil.which(require_tool(PROVER)) or PROVER
-    run_tool(["why3", "config", "detect"], folder, {"HOME": str(folder)})
+    done = run_tool(["why3", "config", "detect"], folder, {"HOME": str(folder)})
     script, config = folder / f"{PROVER}.sh", folder / CONFIG
+    if not config.is_file():
+        reason = (done.stderr.strip().splitlines() or [f"it ended with {done.returncode}"])[-1]
+        raise BuildError(f"why3 writes no configuration: {reason}")
     script.write_text(f'#!/bin/sh\nexec {shlex.quote(found)} {SEARCH} "$@"\n')
     script.chmod(0o700)
     text = config.read_text()

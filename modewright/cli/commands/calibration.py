@@ -143,7 +143,7 @@ def resolve(
 @contextmanager
 def _report_problems_as_json(as_json: bool) -> Iterator[None]:
     """Print the problems of a SpecError as JSON if requested, and raise it again."""
-    from modewright.api.checking import problem_json
+    from modewright.api.spec_check import problem_json
     from modewright.render import run as show
 
     try:
@@ -157,7 +157,7 @@ def _report_problems_as_json(as_json: bool) -> Iterator[None]:
 
 def _require_format(form: str | None) -> None:
     """Raise BadParameter if the format of a page is unknown."""
-    from codegen.exchange.calibration.formats import FORMATS
+    from codegen.exchange.calibration.file_formats import FORMATS
 
     if form is not None and form not in FORMATS:
         raise typer.BadParameter(f"{form}: one of {', '.join(FORMATS)}", param_hint="--format")
@@ -168,7 +168,7 @@ def _output_format(out: Path, form: str | None) -> str:
 
     The file must be writable; this is checked before any computation.
     """
-    from codegen.exchange.calibration.formats import FORMATS, format_name
+    from codegen.exchange.calibration.file_formats import FORMATS, format_name
 
     _require_format(form)
     require_writable(out)

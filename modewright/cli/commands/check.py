@@ -13,13 +13,13 @@ import typer
 from modewright.cli.common.console import console, report_written_files
 from modewright.cli.common.exit_codes import MAX_SHOWN, PROBLEMS
 from modewright.cli.common.options import Json
-from modewright.render.text import pluralise
+from modewright.render.pluralisation import pluralise
 from modewright.runtime.json_format import format_entry
 from modewright.runtime.output_files import require_writable, write_files
 
 if TYPE_CHECKING:
     from language.text.diagnostic import Problem
-    from modewright.api.checking import CheckResult
+    from modewright.api.spec_check import CheckResult
 
 
 def check(
@@ -44,7 +44,7 @@ def check(
     modewright check --all --github --sarif problems.sarif
     modewright check --all --watch
     """
-    from modewright.api import checking
+    from modewright.api import spec_check as checking
     from modewright.cli.common.watch import spec_folders, watch_changes
 
     require_writable(sarif)
@@ -69,7 +69,7 @@ def _check_specs(
 
     Without errors the step limits of the first `named` specs are printed, too.
     """
-    from modewright.api import checking
+    from modewright.api import spec_check as checking
 
     found = [checking.check_spec(name) for name in names]
     problems = checking.merge_problems(found)
@@ -87,7 +87,7 @@ def _report_problems(
 ) -> None:
     """Print problems as JSON, as GitHub annotations, or as text with the number of specs."""
     from language.text.diagnostic import render_all
-    from modewright.api.checking import problem_json
+    from modewright.api.spec_check import problem_json
     from modewright.render.github_annotations import annotation_lines
 
     if as_json:

@@ -40,7 +40,7 @@ def explain(
     modewright explain estimator --pass program
     modewright explain estimator --pass numbers
     """
-    from modewright.api import explaining
+    from modewright.api import pass_output as explaining
 
     if stage not in PASSES:
         raise typer.BadParameter(f"one of {', '.join(PASSES)}", param_hint="--pass")

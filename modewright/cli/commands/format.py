@@ -9,7 +9,7 @@ import typer
 
 from modewright.cli.common.console import console
 from modewright.cli.common.exit_codes import PROBLEMS
-from modewright.render.text import pluralise
+from modewright.render.pluralisation import pluralise
 from modewright.runtime.output_files import require_writable_location, write_files
 
 

@@ -33,7 +33,7 @@ def fuzz(
     modewright fuzz supervisor --runs 200000 --json
     """
     from modewright.api import code_generation as code
-    from modewright.render import code as show_code, run as show
+    from modewright.render import code_verification as show_code, run as show
 
     with progress_spinner(f"trying {runs} sequences on {automaton}"):
         try:

@@ -52,7 +52,7 @@ def graph(
 def _load_diagram(automaton: str, tests: bool) -> Diagram:
     """Return the diagram of an automaton, shaded by test coverage if requested."""
     if tests:
-        from modewright.api.test_coverage import project_coverage_diagram
+        from modewright.api.spec_coverage import project_coverage_diagram
 
         return project_coverage_diagram(automaton)
     from modewright.diagram.diagram import graph as diagram

@@ -29,7 +29,7 @@ def mcdc(
     modewright mcdc estimator --no-proofs --json
     """
     from modewright.api import code_generation as code
-    from modewright.render import code as show_code, run as show
+    from modewright.render import code_verification as show_code, run as show
 
     with progress_spinner(f"running the C of {automaton} on the tests"):
         try:

@@ -35,7 +35,7 @@ def prove(
     """
     from codegen.proofs.all import CHECKS
     from modewright.api import code_generation as code
-    from modewright.render import code as show_code, run as show
+    from modewright.render import code_verification as show_code, run as show
 
     checks = tuple(only.split(",")) if only else CHECKS
     unknown = sorted(set(checks) - set(CHECKS))

@@ -10,7 +10,7 @@ import typer
 from modewright.cli.common.console import console, progress_spinner, report_written_files
 from modewright.cli.common.exit_codes import EXIT_CODES, PROBLEMS
 from modewright.cli.common.options import Json, Plot, picture_format, usage_errors
-from modewright.render.text import pluralise
+from modewright.render.pluralisation import pluralise
 from modewright.runtime.output_files import require_writable, write_files
 
 recording = typer.Typer(

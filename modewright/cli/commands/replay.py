@@ -55,7 +55,7 @@ def replay(
     if out:
         files |= encode_run(trajectory, out)
     if plot:
-        from modewright.render.replay_picture import replay_picture
+        from modewright.render.replay_figure import replay_picture
 
         title = f"{estimator} on {recording.name}" + (f", variant {variant}" if variant else "")
         files[plot] = replay_picture(replayed, title, picture_format(plot))

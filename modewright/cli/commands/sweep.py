@@ -12,7 +12,7 @@ from modewright.cli.common.console import console, progress_bar, report_written_
 from modewright.cli.common.exit_codes import PROBLEMS
 from modewright.cli.common.interruption import debounce_interrupts
 from modewright.cli.common.options import Json, Sets, usage_errors, values_of
-from modewright.render.text import pluralise
+from modewright.render.pluralisation import pluralise
 from modewright.runtime.output_files import (
     OutputError,
     make_folder,

@@ -75,7 +75,7 @@ def _write_results(
     runs: Sequence[TestRun], sums: Sequence[Coverage], junit: Path | None, graphs: Path | None
 ) -> list[Path]:
     """Write JUnit XML and coverage diagrams if requested; return the paths of the diagrams."""
-    from modewright.api.test_coverage import coverage_diagram
+    from modewright.api.spec_coverage import coverage_diagram
     from modewright.render import spec_tests as show_tests
 
     results = {junit: show_tests.junit_xml(runs)} if junit else {}
@@ -89,7 +89,7 @@ def _write_results(
 
 def _print_json(runs: Sequence[TestRun], sums: Sequence[Coverage]) -> None:
     """Print tests, and coverage if measured, as JSON."""
-    from modewright.api.test_coverage import coverage_json
+    from modewright.api.spec_coverage import coverage_json
     from modewright.render.run import print_json
     from modewright.render.spec_tests import spec_test_json
 
@@ -99,7 +99,7 @@ def _print_json(runs: Sequence[TestRun], sums: Sequence[Coverage]) -> None:
 
 def _report_end(runs: Sequence[TestRun], sums: Sequence[Coverage]) -> None:
     """Print the coverage and the numbers of passed and failed tests."""
-    from modewright.api.test_coverage import coverage_lines
+    from modewright.api.spec_coverage import coverage_lines
     from modewright.render.spec_tests import spec_tests_summary
 
     for each in sums:

@@ -43,8 +43,8 @@ def trace(
     modewright trace estimator --requirements needs.csv --run --out trace.html
     modewright trace estimator --keys --out keys.html
     """
-    from modewright.api import traces
-    from modewright.render import trace as show_trace
+    from modewright.api import traceability as traces
+    from modewright.render import requirement_trace as show_trace
 
     form = out.suffix.lower() if out else ""
     if out and form not in FORMATS:
@@ -71,7 +71,7 @@ def trace(
 
 def _report_key_trace(specs: list[str], out: Path | None, form: str, as_json: bool) -> None:
     """Trace keys to lines of C and write a page with both, or JSON."""
-    from modewright.api import traces
+    from modewright.api import traceability as traces
     from modewright.render import key_trace as show_keys
 
     if form == ".csv":

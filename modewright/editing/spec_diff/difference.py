@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Literal
 
 from language.expressions.parser import parse_expression
-from language.expressions.syntax_tree import Negation, NumberLiteral, SyntaxTree, is_same_expression
+from language.expressions.syntax_tree import Negation, NumberLiteral, SyntaxTree
 from language.expressions.units import Dimension, are_compatible
 from language.text.diagnostic import Problems, SpecError
 from language.text.document import Document, Entry, MappingNode, ScalarNode, SequenceNode, YamlNode
@@ -267,8 +267,8 @@ def _is_equivalent(old: YamlNode, new: YamlNode) -> bool:
         case ScalarNode(), ScalarNode():
             if old.text == new.text or old.text.split() == new.text.split():
                 return True
-            first, second = _parse_or_none(old), _parse_or_none(new)
-            return first is not None and second is not None and is_same_expression(first, second)
+            tree = _parse_or_none(old)
+            return tree is not None and tree == _parse_or_none(new)
         case SequenceNode(), SequenceNode():
             same = len(old.nodes) == len(new.nodes)
             return same and all(map(_is_equivalent, old.nodes, new.nodes))

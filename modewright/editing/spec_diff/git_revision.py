@@ -12,8 +12,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from codegen.toolchain.external_tools import require_tool
 from language.overlays.expand_document import expand_document
-from language.reading.reader import NO_SPAN
+from language.readers.base_reader import NO_SPAN
 from language.text.diagnostic import Problems, Source, Span, SpecError
 from language.text.document import Document, Entry, MappingNode, ScalarNode, SequenceNode, YamlNode
 from language.text.node_edit import put_node
@@ -28,7 +29,7 @@ def load_documents(*references: str) -> Iterator[list[Document]]:
     A reference is the name or file of a spec below the working folder, or `REVISION:spec` for a
     revision of Git; an existing file takes precedence. Bases and models come from the same
     revision. Files of a revision are in a temporary folder until the context ends. Raises
-    SpecError, also if Git does not know the revision.
+    SpecError, also if Git does not know the revision, and MissingToolError if Git is not installed.
     """
     with tempfile.TemporaryDirectory() as folder:
         yield [
@@ -100,10 +101,10 @@ def _relabel_source(node: YamlNode, folder: str, revision: str) -> YamlNode:
 def _extract_revision(reference: str, revision: str, folder: Path) -> None:
     """Write the specs of a revision below the working folder into a folder.
 
-    Raises SpecError if Git does not know the revision.
+    Raises SpecError if Git does not know the revision, MissingToolError without Git.
     """
     try:
-        command = ["git", "archive", "--format=tar", revision, "--", "*.yaml"]
+        command = [require_tool("git"), "archive", "--format=tar", revision, "--", "*.yaml"]
         data = subprocess.run(command, capture_output=True, check=True).stdout
     except (OSError, subprocess.CalledProcessError) as error:
         output = getattr(error, "stderr", b"") or str(error).encode()

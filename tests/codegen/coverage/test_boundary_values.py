@@ -16,7 +16,7 @@ from codegen.coverage.boundary_values import (
 from codegen.coverage.mcdc import COVERAGE_EXPORTER, measure_mcdc
 from language.ir.number_type import ROUNDING_FUNCTIONS, NumberType
 from language.ir.program import Program
-from tests.language.build import program
+from tests.language.spec_builders import program
 
 BELT = """language: 1
 automaton: belt

@@ -13,7 +13,7 @@ from codegen.coverage.libfuzzer import FUZZER_COMPILER
 from codegen.coverage.mcdc import COVERAGE_EXPORTER, measure_mcdc
 from language.ir.program import Program
 from modewright.api.simulation import program as program_named
-from tests.language.build import program
+from tests.language.spec_builders import program
 
 pytestmark = pytest.mark.skipif(
     not (shutil.which(COVERAGE_EXPORTER) and shutil.which(FUZZER_COMPILER)),

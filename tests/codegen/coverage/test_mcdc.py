@@ -15,7 +15,7 @@ from codegen.emit.c_module import emit_c_files
 from language.ir.program import Program
 from modewright.api import code_generation as code
 from modewright.cli.app import app
-from tests.language.build import program
+from tests.language.spec_builders import program
 
 pytestmark = pytest.mark.skipif(
     not shutil.which(COVERAGE_EXPORTER), reason="no llvm-cov-19: make system-packages"

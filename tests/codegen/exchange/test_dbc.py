@@ -15,7 +15,7 @@ from language.ir.program import unqualified_name
 from modewright.api.simulation import program
 from modewright.cli.app import app
 from modewright.cli.common.exit_codes import run_with_exit_code
-from tests.language.build import program as made
+from tests.language.spec_builders import program as made
 
 PERIODS = {"contactor": 10, "supervisor": 10, "estimator": 1, "estimator_float32": 1}
 """What the specs say [ms]."""

@@ -18,9 +18,9 @@ from language.ir.traversal import block_reads, names_used, walk_ops
 from lockstep.comparison import compare
 from lockstep.tick_log import TickLog
 from modewright.api.simulation import program as shipped
-from tests.language.build import program
+from tests.language.spec_builders import program
 from tests.lockstep.heater import column
-from tests.lockstep.programs import record_ticks
+from tests.lockstep.program_strategies import record_ticks
 
 CART = """language: 1
 automaton: cart

@@ -22,7 +22,7 @@ from language.ir.number_type import NumberType
 from language.ir.ops import Binary, Branch, Call, Compare, Expr, Ref, RunBlock, Unary, Value
 from language.numerics.evaluate import evaluate
 from modewright.api.simulation import program as shipped
-from tests.language.build import program
+from tests.language.spec_builders import program
 
 X = Ref("x")
 KEYS = """language: 1

@@ -9,7 +9,7 @@ from codegen.emit.c_module import restrict_to_step
 from codegen.predictor.predictor import Predictor, build_predictor, columns_of, slice_to_outputs
 from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
-from tests.language.build import program
+from tests.language.spec_builders import program
 
 TEXT = """language: 1
 automaton: slider

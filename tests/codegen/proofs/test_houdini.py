@@ -17,10 +17,10 @@ from codegen.proofs.infeasible.symbolic_execution import SymbolicProgram
 from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
 from modewright.api.simulation import program as program_named
-from tests.lockstep.random_specs.running import record_ticks
+from tests.lockstep.random_specs.engine_run import record_ticks
 from tests.lockstep.random_specs.spec import Spec, program as program_of
 from tests.lockstep.random_specs.spec_kinds import spec_of
-from tests.validation.figures.random_charts import programs
+from tests.validation.evidence.random_charts import programs
 
 CHARTS, SEEDS, TICKS = (3, 6), (14, 19), 300
 """A chart without regions, one with two."""

@@ -18,8 +18,8 @@ from codegen.proofs.infeasible.infeasible_conditions import (
 from language.ir.program import Program
 from modewright.api import code_generation as code
 from modewright.api.simulation import program as program_named
-from tests.language.build import program
-from tests.lockstep.random_specs.running import record_ticks
+from tests.language.spec_builders import program
+from tests.lockstep.random_specs.engine_run import record_ticks
 from tests.lockstep.random_specs.spec import program as program_of
 from tests.lockstep.random_specs.spec_kinds import spec_of
 

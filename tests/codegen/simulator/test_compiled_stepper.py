@@ -13,7 +13,7 @@ from codegen.toolchain.compiler import flags_at_level
 from engine.interpreter.interpreter import Interpreter
 from engine.simulation.simulate import simulate
 from modewright.api.simulation import load
-from tests.language.build import ROOT, program
+from tests.language.spec_builders import ROOT, program
 from tests.lockstep.heater import heater
 
 stepper = partial(CompiledStepper, flags=flags_at_level("O0"))

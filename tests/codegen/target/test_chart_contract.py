@@ -22,7 +22,7 @@ from language.loading.load import load_automaton, program_of
 from language.overlays.expand_document import Project
 from language.programs.name_bindings import chart_context_of
 from modewright.api.simulation import program
-from tests.language.build import automaton
+from tests.language.spec_builders import automaton
 
 pytestmark = pytest.mark.skipif(
     not all(map(shutil.which, DEBIAN_PACKAGES)), reason="a tool is missing: make system-packages"

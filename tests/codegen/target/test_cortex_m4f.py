@@ -10,14 +10,14 @@ import pytest
 
 from codegen.toolchain.compiler import FLAGS, BuildError, flags_at_level
 from codegen.toolchain.external_tools import ARM_COMPILER, EMULATOR
-from codegen.toolchain.machine import CORTEX_M4F, run_in_qemu
+from codegen.toolchain.target_machine import CORTEX_M4F, run_in_qemu
 from language.ir.number_type import NUMBER_TYPES, NumberType
 from lockstep.comparison import compare
 from lockstep.tick_log import TickLog
 from modewright.api.simulation import lockstep, program
 from tests.codegen.target.closed_loop import record_driveline, record_supervisor
-from tests.lockstep.programs import record_ticks
-from tests.lockstep.test_flags import PRODUCT, TINY
+from tests.lockstep.program_strategies import record_ticks
+from tests.lockstep.test_compiler_flags import PRODUCT, TINY
 
 pytestmark = pytest.mark.skipif(
     not (shutil.which(ARM_COMPILER) and shutil.which(EMULATOR)),

@@ -23,7 +23,7 @@ from language.lowering.fault_mode import add_fault_transitions
 from language.model.automaton import Automaton, Mode
 from language.model.statechart import Chart
 from language.programs.name_bindings import chart_context_of
-from tests.language.build import automaton
+from tests.language.spec_builders import automaton
 
 pytestmark = pytest.mark.skipif(
     not all(map(shutil.which, DEBIAN_PACKAGES)), reason="a tool is missing: make system-packages"

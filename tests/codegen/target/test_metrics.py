@@ -16,12 +16,12 @@ from codegen.harness.instruction_count import count_instructions
 from codegen.harness.metrics import measure_code
 from codegen.toolchain.compiler import FLAGS
 from codegen.toolchain.external_tools import ARM_COMPILER, EMULATOR
-from codegen.toolchain.machine import CORTEX_FLAGS, CORTEX_M4F
+from codegen.toolchain.target_machine import CORTEX_FLAGS, CORTEX_M4F
 from modewright.api.simulation import program
 from modewright.cli.app import app
 from modewright.cli.common.exit_codes import run_with_exit_code
+from tests.codegen.hand_written_c.timing_comparison import duel
 from tests.codegen.target.closed_loop import record_driveline
-from tests.codegen.twin.duel import duel
 
 pytestmark = pytest.mark.skipif(
     not (shutil.which(ARM_COMPILER) and shutil.which(EMULATOR)),

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
-import subprocess
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from codegen.harness.harness import build_executable, compared_variables, tick_inputs
-from codegen.toolchain import compiler as build
-from codegen.toolchain.compiler import BuildError, compile_program, find_compiler, run_executable
+from codegen.harness.sanitizers import run_sanitised
+from codegen.simulator.compiled_stepper import CompiledStepper
+from codegen.simulator.simulator_library import build_library
+from codegen.toolchain.compiler import (
+    FLAGS,
+    BuildError,
+    compile_program,
+    compiler_version,
+    find_compiler,
+    run_executable,
+)
+from codegen.toolchain.external_tools import run_tool
 from language.text.diagnostic import MissingToolError
 from lockstep.comparison import compare
 from tests.lockstep.heater import heater, heater_tape
@@ -102,17 +112,80 @@ def test_a_compiled_program_that_fails_is_an_error(tmp_path: Path) -> None:
         run_executable(target, b"")
 
 
-def test_a_compiler_that_hangs_is_a_build_error(
+HANGING = """\
+#!/bin/sh
+case "$*" in *--version*) echo slow; exit;; esac
+exec sleep 60
+"""
+
+
+def compile_a_program(folder: Path) -> None:
+    compile_program([folder / "any.c"], folder / "program")
+
+
+def compile_a_library(folder: Path) -> None:
+    sources = [folder / "one.c", folder / "two.c"]
+    build_library(sources, folder / "library.so", FLAGS, None)
+
+
+def step_a_program(folder: Path) -> None:
+    CompiledStepper(heater(), (*FLAGS, "-DHANGING"))
+
+
+def run_a_program(folder: Path) -> None:
+    run_executable(folder / "cc", b"")
+
+
+def run_under_sanitizers(folder: Path) -> None:
+    run_sanitised(folder / "cc", timeout=0.2)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        compile_a_program,
+        compile_a_library,
+        step_a_program,
+        run_a_program,
+        run_under_sanitizers,
+        lambda folder: run_tool([str(folder / "cc")], folder),
+    ],
+)
+def test_a_program_that_hangs_is_a_build_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: Callable[[Path], object]
+) -> None:
+    monkeypatch.setenv("CC", str(script(tmp_path / "cc", HANGING)))
+    monkeypatch.setattr("codegen.toolchain.compiler.TIMEOUT", 0.2)
+    monkeypatch.setattr("codegen.toolchain.external_tools.TOOL_TIMEOUT", 0.2)
+    with pytest.raises(BuildError, match=r"was not done after 0\.2 s"):
+        call(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        compile_a_program,
+        run_a_program,
+        run_under_sanitizers,
+        lambda folder: compiler_version(),
+        lambda folder: run_tool([str(folder / "cc")], folder),
+    ],
+)
+def test_a_program_that_does_not_start_is_a_build_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: Callable[[Path], object]
+) -> None:
+    monkeypatch.setenv("CC", str(script(tmp_path / "cc", "neither a script nor a program")))
+    with pytest.raises(BuildError, match=r"does not run: .*Exec format error"):
+        call(tmp_path)
+
+
+def test_the_message_of_a_compiler_may_have_any_bytes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def hangs(*arguments: object, **options: object) -> None:
-        raise subprocess.TimeoutExpired("cc", build.TIMEOUT)
-
-    monkeypatch.setattr("codegen.toolchain.compiler.subprocess.run", hangs)
-    with pytest.raises(BuildError, match="120 s"):
-        compile_program([tmp_path / "any.c"], tmp_path / "program")
-    with pytest.raises(BuildError, match="120 s"):
-        run_executable(tmp_path / "program", b"")
+    text = "#!/bin/sh\nprintf 'error: \\344\\n' >&2\nexit 1\n"
+    monkeypatch.setenv("CC", str(script(tmp_path / "cc", text)))
+    with pytest.raises(BuildError, match="error: \ufffd"):
+        compile_a_program(tmp_path)
 
 
 def test_the_folder_of_an_executable_goes_away(temporary: Path) -> None:

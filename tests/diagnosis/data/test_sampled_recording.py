@@ -10,7 +10,7 @@ import pytest
 
 from diagnosis.data.sampled_recording import has_feedthrough
 from diagnosis.model.candidate import compile_candidate
-from diagnosis.pipeline.case import Case, read_series
+from diagnosis.pipeline.diagnosis_case import Case, read_series
 from engine.recordings.recording_window import paths_overlap
 from language.loading.load import automaton_of
 from language.loading.recording_map_reader import read_map

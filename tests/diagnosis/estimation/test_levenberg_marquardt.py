@@ -21,7 +21,7 @@ from diagnosis.model.candidate import Candidate
 from diagnosis.model.placed_effect import find_placements, shipped_effects
 from language.loading.load import automaton_of
 from language.overlays.expand_document import Project, expand_document, read_document
-from tests.language.build import ROOT
+from tests.language.spec_builders import ROOT
 
 PERIOD = Fraction(1, 200)
 COUNT = 500

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from codegen.predictor.predictions import Prediction, StackedPrediction
+from codegen.predictor.predictor_arrays import Prediction, StackedPrediction
 from diagnosis.estimation.linearisation import _pseudoinverse
 from diagnosis.estimation.operating_point import _dwell_intervals
 

@@ -14,7 +14,7 @@ from language.overlays.expand_document import expand_document, read_document
 from modewright.cli.app import app
 from modewright.cli.common.exit_codes import run_with_exit_code
 from tests.diagnosis.rotor_project import MAP, SPEC
-from tests.language.build import ROOT, SHIPPED, document, project_of
+from tests.language.spec_builders import ROOT, SHIPPED, document, project_of
 
 HOUSE_EFFECT = """language: 1
 effect: windage

@@ -10,12 +10,12 @@ import jsonschema
 import pytest
 
 import modewright as mw
+from diagnosis.data_quality.finding import Finding
 from diagnosis.pipeline.usable_recordings import usable_recordings
-from diagnosis.quality.finding import Finding
-from diagnosis.report import sentences as wording
+from diagnosis.report import report_text as wording
 from diagnosis.report.diagnosis_report import verdict_to_json
-from diagnosis.report.page import report_files
-from diagnosis.report.sentences import format_headline, format_separation
+from diagnosis.report.report_files import report_files
+from diagnosis.report.report_text import format_headline, format_separation
 from modewright.api.recordings import held_out_findings
 from tests.diagnosis.rotor_project import SCHEMA, write_project
 

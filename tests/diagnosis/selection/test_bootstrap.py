@@ -44,7 +44,7 @@ from diagnosis.selection.replicate import simulate_replicate
 from language.loading.load import automaton_of
 from language.overlays.expand_document import expand_document
 from modewright.api.diagnosis import diagnose
-from tests.language.build import ROOT, SHIPPED, document
+from tests.language.spec_builders import ROOT, SHIPPED, document
 
 TEXT = """language: 1
 automaton: wheel

@@ -17,7 +17,7 @@ from diagnosis.selection.confusion_set import (
     near_best,
 )
 from language.overlays.expand_document import Project
-from tests.diagnosis.accepted_report import acceptable_layers, make_dossier
+from tests.diagnosis.example_report import acceptable_layers, make_dossier
 
 LEFT_OUT = 50.0
 """Gain on what was left out, the same for all: what was fitted decides."""

@@ -33,7 +33,7 @@ from diagnosis.validation.adequacy import (
 )
 from tests.diagnosis.estimation.test_levenberg_marquardt import bench
 from tests.diagnosis.localisation.test_ranking import fit_first_base, with_effect
-from tests.language.build import ROOT
+from tests.language.spec_builders import ROOT
 
 __all__ = ["bench"]
 NEEDED = 50.0

@@ -27,10 +27,10 @@ from language.loading.load import automaton_of
 from language.overlays.expand_document import Project, expand_document
 from language.text.diagnostic import Source
 from language.text.project_files import parse_document
-from tests.generators.open.case import simulate_cases, stream
-from tests.generators.open.recording import sample_recording
-from tests.generators.open.tip_out import VARIANT, tip_out_case
-from tests.language.build import ROOT
+from tests.generators.open_cases.case import simulate_cases, stream
+from tests.generators.open_cases.recording import sample_recording
+from tests.generators.open_cases.tip_out import VARIANT, tip_out_case
+from tests.language.spec_builders import ROOT
 
 
 def bench_of(hidden: bool) -> ModelSet:

@@ -23,10 +23,10 @@ from engine.batch.run_plan import planning_obstacle
 from engine.simulation.instance_programs import programs_of
 from engine.simulation.simulate import simulate
 from language.model.system import Scenario, ScheduledCalibration, StimulusPiece, System
-from language.programs.simulation_assembly import SimulationAssembly
+from language.programs.system_program import SimulationAssembly
 from modewright.api.simulation import load
-from modewright.runtime.compiled_run import run_batch, run_simulation
-from tests.language.build import ROOT
+from modewright.runtime.back_end_choice import run_batch, run_simulation
+from tests.language.spec_builders import ROOT
 
 DRIVELINES = ROOT / "tests/data/specs/drivelines"
 compile_unoptimised = partial(load_library, flags=flags_at_level("O0"))

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from codegen.simulator.simd_variants import LANES
+from codegen.simulator.simd_batch import LANES
 from codegen.simulator.simulator_source import emit_simulator_files
 from engine.batch.batch import Batch, InputTable, SignalStatistic
 from engine.batch.compiled_batch import CompiledBatch, run_compiled_batch
@@ -23,7 +23,7 @@ from tests.engine.batch.test_compiled_run import (
     compile_unoptimised,
     load_drive,
 )
-from tests.language.build import ROOT
+from tests.language.spec_builders import ROOT
 
 COUNT = LANES + 1
 """One vector and a variant that is left over."""

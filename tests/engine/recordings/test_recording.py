@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.engine.written_recordings import (
+from tests.engine.recording_files import (
     GOOD,
     HEAD,
     Read,

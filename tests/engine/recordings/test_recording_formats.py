@@ -16,7 +16,7 @@ from engine.recordings.recording import Recording, read_recording
 from language.loading.recording_map_reader import read_map
 from language.overlays.expand_document import Project, read_document
 from language.text.diagnostic import MissingToolError, SpecError
-from tests.engine.written_recordings import render_problems
+from tests.engine.recording_files import render_problems
 
 DBC = """\
 VERSION ""

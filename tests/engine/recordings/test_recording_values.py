@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 
 from engine.recordings.recording import read_recording
 from language.text.diagnostic import SpecError
-from tests.engine.written_recordings import GOOD, HEAD, RenderProblems, render_problems, write_map
+from tests.engine.recording_files import GOOD, HEAD, RenderProblems, render_problems, write_map
 
 
 class TestAValue:

@@ -11,7 +11,7 @@ from engine.recordings.recording import Recording, read_recording, split_by_wind
 from language.loading.recording_map_reader import read_map
 from language.overlays.expand_document import Project, read_document
 from language.text.diagnostic import SpecError
-from tests.engine.written_recordings import render_problems
+from tests.engine.recording_files import render_problems
 
 HEAD = "language: 1\nmap: bench\ntime: {column: t_s, unit: s}\ncolumns: {a: {to: u, unit: A}}\n"
 

@@ -10,8 +10,8 @@ import pytest
 
 from language.overlays.expand_document import Project
 from language.text.diagnostic import SpecError
-from tests.engine.loaded_replay import LoadedReplay, load_replay
-from tests.engine.written_recordings import render_problems
+from tests.engine.recording_files import render_problems
+from tests.engine.replay_fixtures import LoadedReplay, load_replay
 
 ECHO = """language: 1
 automaton: echo

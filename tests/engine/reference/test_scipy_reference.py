@@ -19,7 +19,7 @@ from engine.reference.scipy_reference import (
     with_reference_numbers,
 )
 from engine.reference.scipy_stepper import INTEGRATION_BLOCKS, ScipyStepper, without_integration
-from engine.results.samples import Event
+from engine.results.sampled_run import Event
 from engine.results.trajectory import Trajectory
 from engine.simulation import instance_programs as starting
 from engine.simulation.instance_programs import programs_of

@@ -12,7 +12,7 @@ from matplotlib.colors import to_hex
 
 from engine.results.mode_band import INACTIVE_COLOUR, PALETTE
 from engine.results.plot import draw_overview
-from engine.results.samples import Event
+from engine.results.sampled_run import Event
 from engine.results.trajectory import Trajectory
 
 

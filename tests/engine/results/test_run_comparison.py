@@ -10,7 +10,7 @@ import pytest
 
 from engine.results.comparison_plot import draw_difference
 from engine.results.run_comparison import compare_runs
-from engine.results.samples import Event
+from engine.results.sampled_run import Event
 from engine.results.trajectory import Trajectory
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from engine.results.run_file import encode_run, read_run, side_path
-from engine.results.samples import Event
+from engine.results.sampled_run import Event
 from engine.results.trajectory import Trajectory
 from language.text.diagnostic import MissingToolError, SpecError
 

@@ -15,7 +15,7 @@ from engine.reference.scipy_stepper import ScipyMethod
 from engine.simulation.simulate import simulate
 from language.model.system import Instance, Scenario, System
 from modewright.api.simulation import load
-from tests.language.build import ROOT
+from tests.language.spec_builders import ROOT
 
 SPECS = ROOT / "tests/data/specs/drivelines"
 DRIVES = {

@@ -73,10 +73,10 @@ states:
   w_em:    {initial: w_w * R, range: [-400, 2400]}
   theta_d: {initial: 0.0740754719736 rad, range: [-0.5, 0.5]}
   theta_b: {initial: alpha, range: [-0.2, 0.2]}
-equations: {free: in(driveline_beside.gap.no_contact)}
+equations: {is_free: in(driveline_beside.gap.no_contact)}
 modes:
   going: {runs: {of: driveline_beside.always, method: rk4, substeps: 4, events: 8}}
-outputs: [w_w, w_em, theta_d, theta_b, free, mode]
+outputs: [w_w, w_em, theta_d, theta_b, is_free, mode]
 """
 SYSTEM = """\
 language: 1
@@ -105,7 +105,7 @@ def test_a_run_follows_the_regions_of_its_model(folder: Path) -> None:
         off = np.abs(signals[f"plant.{name}"] - signals[f"est.{name}"])
         assert off.max() < tolerance, (name, off.max())
     free = signals["plant.gap"] == 0
-    assert (signals["est.free"] == free).mean() > 0.999
+    assert (signals["est.is_free"] == free).mean() > 0.999
     assert 0.01 < free.mean() < 0.99
 
 

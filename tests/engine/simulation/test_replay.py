@@ -13,7 +13,7 @@ import pytest
 
 from engine.interpreter.interpreter import Stepper
 from engine.simulation.replay import Replay, used_columns
-from tests.engine.loaded_replay import (
+from tests.engine.replay_fixtures import (
     ARRIVAL,
     ESTIMATORS,
     PAPER,

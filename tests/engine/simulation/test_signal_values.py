@@ -16,7 +16,7 @@ from language.ir.program import Program
 from language.loading.scenario_reader import read_scenario
 from language.loading.system_reader import read_system
 from language.overlays.expand_document import Project, read_document
-from tests.language.build import project_of
+from tests.language.spec_builders import project_of
 
 SENSED = """language: 1
 system: sensed

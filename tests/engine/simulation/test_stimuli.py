@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import modewright as mw
-from tests.language.build import problem_lines, project_of
+from tests.language.spec_builders import problem_lines, project_of
 
 CART = """language: 1
 automaton: cart
@@ -118,3 +118,37 @@ def test_columns_of_a_recording_fit_the_inputs(tmp_path: Path) -> None:
         "`wey` is not a column of the scenario's recording did you mean `way`?",
         "column `speed` is in `m`, input `u` is in `m/s` ",
     ]
+
+
+NAMED_MAP = """language: 1
+map: columns_of_the_drive
+time: {column: t, unit: ms}
+columns: {speed: {to: u, unit: km/h}, way: {compare: x, unit: m}}
+"""
+
+
+@pytest.mark.parametrize(
+    "beside", ["windows: [[1 s, 2 s]]", "dbc: bus.dbc", "constants: {hill: 0}", "time: {column: t}"]
+)
+def test_beside_the_name_of_a_map_only_the_file_is_given(tmp_path: Path, beside: str) -> None:
+    named = f"recording: {{file: drive.csv, map: columns_of_the_drive, {beside}}}\n"
+    text = RUN.format(hold="linear", horizon="recording")
+    head, _, rest = text.partition("recording:\n")
+    project_of(
+        tmp_path,
+        cart=CART,
+        drive=NAMED_MAP,
+        run=head + named + "initial" + rest.partition("initial")[2],
+    )
+    (tmp_path / "spec" / "drive.csv").write_text(DRIVE)
+    (problem,) = mw.check("run", tmp_path)
+    assert (
+        problem.label == f"`{beside.partition(':')[0]}` is given by the map `columns_of_the_drive`"
+    )
+    assert problem.help == "write it in the map, or write the whole map here without `map`"
+
+
+def test_the_map_of_a_recording_is_given_by_its_name(tmp_path: Path) -> None:
+    text = RUN.format(hold="linear", horizon="recording")
+    project_of(tmp_path, cart=CART, run=text.replace("  file:", "  map: {time: t}\n  file:"))
+    assert "`map` is a single value" in [problem.label for problem in mw.check("run", tmp_path)]

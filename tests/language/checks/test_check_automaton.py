@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from language.loading.load import load_automaton
-from tests.language.build import automaton, problem_lines, project_of
+from tests.language.spec_builders import automaton, problem_lines, project_of
 
 CONTINUOUS = """language: 1
 automaton: model

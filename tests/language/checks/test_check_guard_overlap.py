@@ -11,7 +11,7 @@ from language.checks.check_guard_overlap import are_syntactically_exclusive
 from language.ir.ops import Expr, Value
 from language.lowering.expressions import lower_expression
 from language.numerics.evaluate import evaluate
-from tests.language.build import automaton, problem_lines, raised_problems, tree
+from tests.language.spec_builders import automaton, problem_lines, raised_problems, tree
 
 TEXT = """language: 1
 automaton: slide

@@ -11,7 +11,7 @@ from language.expressions.syntax_tree import Name, SyntaxTree, names
 from language.ir.ops import Ref
 from language.lowering.expressions import lower_expression
 from language.numerics.evaluate import evaluate
-from tests.language.build import raised_problems, tree
+from tests.language.spec_builders import raised_problems, tree
 
 NAMES = {name: Ref(name) for name in ("x", "z")}
 Z = 0.7

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from language.expressions.parser import parse_balance, parse_expression
-from language.expressions.syntax_tree import names, structural_key
+from language.expressions.syntax_tree import names
 from language.expressions.text_rewrite import (
     join_summands,
     names_in_text,
@@ -15,7 +15,7 @@ from language.expressions.text_rewrite import (
     split_summands,
     substitute_reads,
 )
-from tests.language.build import scalar
+from tests.language.spec_builders import scalar
 
 leaves = st.sampled_from(["a", "b", "ab", "m", "x_1", "2", "0.5", "3 m", "2.0e-3 N*m", "5 1/s"])
 expressions = st.recursive(
@@ -50,11 +50,11 @@ def test_what_is_put_for_a_name_is_one_operand(text: str, put: str) -> None:
     """Substituting in the text and in the tree are one: parse(text[a := put])."""
     new, _ = substitute_reads(text, {"a": put})
     marked, _ = substitute_reads(text, {"a": "qq"})
-    by_tree = repr(structural_key(parse_expression(scalar(marked)))).replace(
-        repr(structural_key(parse_expression(scalar("qq")))),
-        repr(structural_key(parse_expression(scalar(put)))),
+    by_tree = repr(parse_expression(scalar(marked))).replace(
+        repr(parse_expression(scalar("qq"))),
+        repr(parse_expression(scalar(put))),
     )
-    assert repr(structural_key(parse_expression(scalar(new)))) == by_tree
+    assert repr(parse_expression(scalar(new))) == by_tree
 
 
 @given(st.lists(st.tuples(st.sampled_from("+-"), expressions), min_size=1, max_size=4))

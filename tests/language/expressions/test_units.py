@@ -24,8 +24,8 @@ from language.expressions.units import (
     parse_unit,
     unit_hint,
 )
-from tests.language.build import automaton, si_value
-from tests.language.unit_meaning import MEANING
+from tests.language.si_factors import MEANING
+from tests.language.spec_builders import automaton, si_value
 
 TURNING = {"deg": ("pi / 180", 0), "rev": ("2 * pi", 0), "rpm": ("2 * pi / 60", -1)}
 """Units with pi in their factor: the formula and the power of the second."""

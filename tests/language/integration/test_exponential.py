@@ -13,8 +13,8 @@ import pytest
 from numpy.typing import NDArray
 
 from engine.interpreter.interpreter import Interpreter
-from tests.language.build import solve_constants
 from tests.language.continuous_model import Flow
+from tests.language.spec_builders import solve_constants
 
 EXACT = 1e-13
 """Relative: some ten roundings of 1.1e-16 a tick, over at most fifty ticks."""

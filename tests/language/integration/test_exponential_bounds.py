@@ -13,8 +13,8 @@ from hypothesis import given, strategies as st
 from language.integration.exponential import MAX_STEP_NORM
 from language.integration.taylor_bound import taylor_term_count
 from language.ir.program import Program
-from tests.language.build import problem_lines, program, project_of, raised_problems
 from tests.language.continuous_model import Flow
+from tests.language.spec_builders import problem_lines, program, project_of, raised_problems
 
 ONE = {"x": 1.0}
 TWO = {"x": 1.0, "z": 1.0}

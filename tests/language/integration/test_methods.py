@@ -13,8 +13,8 @@ from language.integration.stability_limit import largest_stable_step
 from language.ir.program import Program, StabilityLimit
 from language.loading.load import automaton_of, program_of
 from language.overlays.expand_document import read_document
-from tests.language.build import problem_lines, project_of, raised_problems
 from tests.language.continuous_model import Flow
+from tests.language.spec_builders import problem_lines, project_of, raised_problems
 
 BERNOULLI = "x: der(x) = -2 1/s * x + 3 1/s * x^2"
 ORDERS = {"euler": 1, "midpoint": 2, "rk4": 4}

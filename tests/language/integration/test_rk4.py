@@ -14,7 +14,7 @@ from engine.results.trajectory import Trajectory
 from engine.simulation.simulate import simulate
 from language.integration.rk4 import TERMS
 from language.model.system import Instance, Scenario, System
-from tests.language.build import NOWHERE, automaton, program, stepper
+from tests.language.spec_builders import NOWHERE, automaton, program, stepper
 
 LOGISTIC = """language: 1
 automaton: logistic

@@ -31,7 +31,7 @@ from language.ir.ops import (
 from language.ir.printer import block_lines, digest, format_expr, format_program
 from language.loading.load import automaton_of, program_of
 from language.overlays.expand_document import read_document
-from tests.language.build import SHIPPED, load_shipped, program
+from tests.language.spec_builders import SHIPPED, load_shipped, program
 
 X, Y = Ref("state.x"), Ref("state.y")
 

@@ -9,7 +9,13 @@ import pytest
 from language.loading.recording_map_reader import column_dimension, read_map
 from language.model.system import ColumnMapping, RecordingMap
 from language.overlays.expand_document import read_document
-from tests.language.build import SHIPPED, dimension, document, problem_lines, raised_problems
+from tests.language.spec_builders import (
+    SHIPPED,
+    dimension,
+    document,
+    problem_lines,
+    raised_problems,
+)
 
 TEXT = """language: 1
 map: some

@@ -14,7 +14,7 @@ from language.loading.scenario_reader import MAX_HORIZON, read_scenario
 from language.loading.system_reader import read_system
 from language.model.system import Scenario, System
 from language.overlays.expand_document import read_document
-from tests.language.build import (
+from tests.language.spec_builders import (
     SHIPPED,
     dimension,
     document,
@@ -152,10 +152,45 @@ STEP_TIME = "`the time of a step` is a time above zero, like `2.5 s`"
         ("u: {start: 0, steps: {1 s: 3 kg}}", "`kg` does not fit the unit `km/h`"),
         ("u: {start: 0, steps: [1 s]}", "`inputs.u.steps` is a mapping"),
         ("u: [1, 2]", "`inputs.u` is a mapping"),
+        ("u: {start: 0, steps: {1 s: 3}, hold: previous}", "`hold` belongs to a `table`"),
+        ("u: {start: 0, hold: linear}", "`hold` belongs to a `table`"),
     ],
 )
 def test_an_input_that_is_wrong_is_refused(system: System, inputs: str, label: str) -> None:
     assert label in lines(system, inputs)
+
+
+@pytest.mark.parametrize(
+    ("inputs", "label"),
+    [
+        ("u: {start: 0, steps: {-1 s: 3}}", STEP_TIME),
+        (
+            "u: {start: 0, ramp: {from: 2 s, to: 1 s, value: 3}}",
+            "a ramp ends after it begins",
+        ),
+        ("u: {table: {}}", "a `table` has at least one point"),
+    ],
+)
+def test_a_wrong_time_is_reported_beside_other_problems(
+    system: System, inputs: str, label: str
+) -> None:
+    assert lines(system, f"v: 3, {inputs}") == ["`v` is not an input of `rig`", label]
+
+
+@pytest.mark.parametrize(
+    ("inputs", "label"),
+    [
+        ("u: {start: 0, steps: {0.5 s: 1, -1 s: 3, 0.8 s: 2}}", STEP_TIME),
+        (
+            "u: {table: {0.5 s: 1, 1 s + 1 s: 3, 0.8 s: 2}}",
+            "`the time of a point` is a number with a unit, not an expression",
+        ),
+        ("u: {start: 0, ramp: {to: 1 s, value: 3}}", "`from` is missing"),
+        ("u: {start: 0, ramp: {from: 1 s, value: 3}}", "`to` is missing"),
+    ],
+)
+def test_a_wrong_time_is_one_problem(system: System, inputs: str, label: str) -> None:
+    assert lines(system, inputs) == [label]
 
 
 def test_the_problem_of_a_step_stands_at_the_step(system: System) -> None:

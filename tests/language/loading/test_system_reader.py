@@ -12,7 +12,7 @@ from hypothesis import given, settings, strategies as st
 from language.loading.system_reader import read_system
 from language.model.system import System
 from language.text.document import ScalarNode
-from tests.language.build import document, problem_lines, project_of, raised_problems
+from tests.language.spec_builders import document, problem_lines, project_of, raised_problems
 
 PLANT = """language: 1
 automaton: plant
@@ -205,3 +205,11 @@ def test_two_continuous_automata_are_not_joined(folder: Path) -> None:
     assert system_problem_lines(folder, "p.u: q.w, q.u: speed", instances) == [
         "`q` and `p` are both continuous"
     ]
+
+
+def test_an_input_of_a_system_has_no_range(folder: Path) -> None:
+    text = SYSTEM.format(instances=PAIR, connections=JOINED, outputs="")
+    text = text.replace("speed: {unit: km/h}", "speed: {unit: km/h, range: [0, 99]}")
+    (problem,) = raised_problems(lambda: read_system(document(text), project_of(folder)))
+    assert problem.label == "`range` is not a key of `inputs.speed`"
+    assert problem.help == "the range belongs to the input of the automaton that reads it"

@@ -10,7 +10,6 @@ import pytest
 from language.loading.system_reader import read_system
 from language.model.system import System
 from language.overlays.expand_document import read_document
-from tests.language.build import SHIPPED, project_of, raised_problems, scalar
 from tests.language.loading.test_system_reader import (
     FILTER,
     JOINED,
@@ -19,6 +18,7 @@ from tests.language.loading.test_system_reader import (
     read_rig,
     system_problem_lines,
 )
+from tests.language.spec_builders import SHIPPED, project_of, raised_problems, scalar
 
 
 @pytest.fixture(scope="module")

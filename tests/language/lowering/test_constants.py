@@ -18,12 +18,12 @@ from language.lowering.constants import (
     evaluate_exactly,
     parameter_constants,
 )
-from language.lowering.parameter_bindings import parameter_kinds, parameter_order
+from language.lowering.program_parameters import parameter_kinds, parameter_order
 from language.lowering.wait_ticks import MAX_WAIT_TICKS
 from language.model.automaton import Automaton
 from language.model.declaration import Formula
 from language.text.diagnostic import Problems
-from tests.language.build import (
+from tests.language.spec_builders import (
     automaton,
     load_shipped,
     problem_labels,

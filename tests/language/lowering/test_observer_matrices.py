@@ -9,7 +9,13 @@ import pytest
 from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
 from language.loading.load import lower_automaton, program_of
-from tests.language.build import load_shipped, problem_lines, program, project_of, solve_constants
+from tests.language.spec_builders import (
+    load_shipped,
+    problem_lines,
+    program,
+    project_of,
+    solve_constants,
+)
 
 MODEL = """language: 1
 automaton: m

@@ -29,7 +29,7 @@ from language.ir.traversal import expr_names, names_used, walk_ops
 from language.loading.load import program_of
 from language.lowering.program_builder import finalise_program
 from language.numerics.function_table import FUNCTIONS
-from tests.language.build import load_shipped, program, stepper
+from tests.language.spec_builders import load_shipped, program, stepper
 
 TEXT = """language: 1
 automaton: machine

@@ -8,7 +8,7 @@ from language.loading.calibration_page_reader import parse_pages
 from language.loading.load import load_automaton
 from language.loading.system_reader import read_system
 from language.overlays.expand_document import read_document
-from tests.language.build import problem_lines, project_of
+from tests.language.spec_builders import problem_lines, project_of
 
 PLANT = """language: 1
 automaton: plant

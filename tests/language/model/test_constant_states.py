@@ -12,7 +12,7 @@ from language.ir.program import Program
 from language.ir.traversal import block_writes, reachable_blocks
 from language.model.constant_states import ever_varying_states, varying_states, written_states
 from language.programs.model_run import SATURATION_BLOCK
-from tests.language.build import automaton, load_shipped, program, project_of
+from tests.language.spec_builders import automaton, load_shipped, program, project_of
 
 CART = """\
 language: 1

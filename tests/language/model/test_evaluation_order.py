@@ -14,9 +14,9 @@ from language.ir.program import unqualified_name
 from language.model.automaton import Mode
 from language.model.declaration import Formula
 from language.model.evaluation_order import equation_order, report_cycle
-from language.model.graphs import format_cycle
+from language.model.graph_algorithms import format_cycle
 from language.text.diagnostic import Problems
-from tests.language.build import (
+from tests.language.spec_builders import (
     NOWHERE,
     problem_labels,
     problem_lines,

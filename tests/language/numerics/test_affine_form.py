@@ -11,13 +11,13 @@ from language.integration.vector_field import VectorField, field_blocks
 from language.ir.ops import Assign, Block, Expr, Ref, Select, Value
 from language.lowering.constants import constant_values, parameter_constants
 from language.lowering.expressions import lower_expression
-from language.lowering.parameter_bindings import constant_bindings
+from language.lowering.program_parameters import constant_bindings
 from language.model.automaton import Automaton
 from language.numerics.affine_form import jacobian
 from language.numerics.matrix import Matrix
 from language.programs.continuous_program import lower_continuous_automaton
 from language.text.diagnostic import Problems
-from tests.language.build import automaton, load_shipped, tree
+from tests.language.spec_builders import automaton, load_shipped, tree
 
 STATES = ("x", "v", "z")
 CONSTANTS = {"constant.k": 3.5, "constant.c": -0.25, "calibration.tau": 0.04}

@@ -15,7 +15,7 @@ from language.ir.ops import Assign, Value
 from language.ir.traversal import walk_ops
 from language.numerics.evaluate import apply_function
 from language.numerics.function_table import FUNCTIONS, FUNCTIONS_BY_TYPE
-from tests.language.elementary_errors import EXACT
+from tests.language.ulp_errors import EXACT
 
 POINTS = 3000
 SINGLES = FUNCTIONS_BY_TYPE["float32"]

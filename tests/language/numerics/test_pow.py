@@ -12,8 +12,8 @@ import pytest
 from language.ir.number_type import NumberType, round_to_float32
 from language.numerics.evaluate import apply_function
 from language.numerics.function_table import FUNCTIONS
-from tests.language.elementary_errors import PYTHON, stated_error, ulp_error
 from tests.language.numerics import test_float32_constants as of_single
+from tests.language.ulp_errors import PYTHON, stated_error, ulp_error
 
 Kept = Callable[[float], float]
 POINTS = 20_000

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import example, given, settings, strategies as st
 
 from language.numerics.function_table import FUNCTIONS
-from tests.language.elementary_errors import PYTHON, bits, neighbours_of, stated_error, ulp_error
+from tests.language.ulp_errors import PYTHON, bits, neighbours_of, stated_error, ulp_error
 
 POINTS = 50_000
 BOUNDS = {

@@ -11,7 +11,7 @@ from hypothesis import given, strategies as st
 
 from language.numerics.evaluate import floor
 from language.numerics.function_table import FUNCTIONS
-from tests.language.elementary_errors import PYTHON, bits, stated_error, ulp_error
+from tests.language.ulp_errors import PYTHON, bits, stated_error, ulp_error
 
 POINTS = 40_000
 ANGLE = PYTHON["atan2"]

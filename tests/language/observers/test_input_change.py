@@ -20,7 +20,7 @@ from tests.language.observers.test_recursive_kalman import (
     step,
     ticks,
 )
-from tests.lockstep.programs import record_ticks
+from tests.lockstep.program_strategies import record_ticks
 
 B = np.array([[0.0], [1.0], [0.0]])
 

@@ -15,8 +15,8 @@ from scipy.linalg import expm
 from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
 from lockstep.comparison import compare
-from tests.language.build import program
-from tests.lockstep.programs import record_ticks
+from tests.language.spec_builders import program
+from tests.lockstep.program_strategies import record_ticks
 
 TOLERANCE = 1e-9
 """Of the largest value: semantics, rule 17."""

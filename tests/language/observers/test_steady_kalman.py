@@ -17,7 +17,7 @@ from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
 from language.loading.load import automaton_of, lower_automaton
 from language.overlays.expand_document import read_document
-from tests.language.build import ROOT, program, project_of, solve_constants, stepper
+from tests.language.spec_builders import ROOT, program, project_of, solve_constants, stepper
 
 Matrix = NDArray[np.float64]
 

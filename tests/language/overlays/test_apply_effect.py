@@ -8,9 +8,10 @@ import pytest
 
 from language.loading.load import load_automaton, program_of
 from language.overlays.expand_document import Project, expand_document, read_document
+from language.readers.element_reader import outputs_as_mapping
 from language.text.document import ScalarNode
 from language.text.node_edit import find_node
-from tests.language.build import problem_lines, project_of
+from tests.language.spec_builders import problem_lines, project_of
 
 CART = """language: 1
 automaton: cart
@@ -115,6 +116,69 @@ def test_a_redirection_that_finds_nothing_is_refused(tmp_path: Path) -> None:
     assert problem_lines(
         lambda: expand_document(read_document(project.path_of("laid")), project)
     ) == ["4:15 `lag` cannot be applied here: nothing reads `G`"]
+
+
+def lag_with(folder: Path, redirect: str, base: str = CART) -> Project:
+    """Return a project whose effect `lag` at F has other redirections."""
+    project = cart(folder, "{lag@F: {}}")
+    lag = LAG.replace("redirect: {everywhere: {$u: u_a}}", f"redirect: {redirect}")
+    return project_of(project.root, lag=lag, cart=base)
+
+
+MODES = """modes:
+  only:
+    terms: {v: {push: F}}
+    equations: {pull: F + F}
+    transitions: {again: {to: only, when: F > 3 N and x > 1 m, reset: {x: -abs(F / k)}}}
+"""
+WITH_TERMS = CART.partition("modes:")[0] + MODES + "elements" + CART.partition("elements")[2]
+
+
+def test_exceptions_apply_to_every_redirection(tmp_path: Path) -> None:
+    base = CART.replace("der(x) = v", "der(x) = v + F / k / 1 s")
+    redirect = "{flow: {$u: u_a}, modes: {$u: u_a}, except: [flow.v, when]}"
+    project = lag_with(tmp_path, redirect, base)
+    assert text(project, "flow.x") == "der(x) = v + u_a_F / k / 1 s"
+    assert text(project, "flow.v") == "m * der(v) = F - load - (F_s + F) + F * v / v"
+    assert text(project, "modes.only.transitions.again.when") == "F > 3 N and x > 1 m"
+    assert text(project, "modes.only.transitions.again.reset.x") == "-abs(u_a_F / k)"
+
+
+@pytest.mark.parametrize(
+    ("excepted", "force"), [("outputs", "F"), ("outputs.F", "F"), ("flow", "u_a_F")]
+)
+def test_outputs_may_be_excepted(tmp_path: Path, excepted: str, force: str) -> None:
+    base = CART.replace("outputs: [x, v, F_s]", "outputs: [x, F]")
+    project = lag_with(tmp_path, f"{{everywhere: {{$u: u_a}}, except: [{excepted}]}}", base)
+    tree = expand_document(read_document(project.path_of("laid")), project).root
+    outputs = {entry.key: entry.node for entry in outputs_as_mapping(tree.entries["outputs"].node)}
+    assert isinstance(shown := outputs["F"], ScalarNode)
+    assert shown.text == force
+
+
+@pytest.mark.parametrize(
+    "part", ["terms.v", "terms", "equations.pull", "reset", "transitions.again"]
+)
+def test_a_part_inside_a_mode_has_all_expressions_below_it(tmp_path: Path, part: str) -> None:
+    project = lag_with(tmp_path, f"{{{part}: {{$u: u_a}}}}", WITH_TERMS)
+    new = {
+        "terms.v.push": "u_a_F",
+        "equations.pull": "u_a_F + u_a_F",
+        "transitions.again.when": "u_a_F > 3 N and x > 1 m",
+        "transitions.again.reset.x": "-abs(u_a_F / k)",
+    }
+    for path, redirected in new.items():
+        is_inside = path.startswith(part) or f".{part}." in path
+        expected = redirected if is_inside else redirected.replace("u_a_F", "F")
+        assert text(project, f"modes.only.{path}") == expected
+
+
+def test_a_part_that_is_nowhere_is_refused(tmp_path: Path) -> None:
+    project = lag_with(tmp_path, "{terms.x: {$u: u_a}}", WITH_TERMS)
+    (line,) = problem_lines(
+        lambda: expand_document(read_document(project.path_of("laid")), project)
+    )
+    assert line.endswith("`lag` cannot be applied here: there is no `terms.x`")
 
 
 def test_an_element_without_what_an_effect_needs_is_told_the_key(tmp_path: Path) -> None:

@@ -10,8 +10,8 @@ import modewright as mw
 from language.loading.load import load_automaton
 from language.loading.system_reader import read_system
 from language.overlays.expand_document import Project, read_document
-from modewright.api import explaining
-from tests.language.build import problem_lines, project_of
+from modewright.api import pass_output as explaining
+from tests.language.spec_builders import problem_lines, project_of
 
 FIT = """language: 1
 calibration: fit

@@ -11,7 +11,7 @@ from language.ir.program import Program
 from language.ir.traversal import walk_ops
 from language.loading.load import lower_automaton
 from language.passes.constant_folding import fold_parameters, hoist_inputs, run_passes
-from tests.language.build import automaton
+from tests.language.spec_builders import automaton
 
 TEXT = """language: 1
 automaton: slide

@@ -9,7 +9,7 @@ import pytest
 from engine.interpreter.interpreter import Interpreter
 from language.ir.traversal import reachable_blocks
 from language.programs.model_run import SATURATION_BLOCK
-from tests.language.build import program, project_of
+from tests.language.spec_builders import program, project_of
 
 LANE = """\
 language: 1

@@ -6,9 +6,9 @@ import pytest
 
 from language.ir.ops import Expr
 from language.numerics.evaluate import evaluate
-from language.smt.guard_snapshot import GuardSnapshot
 from language.smt.lie_derivative import LieDerivative
-from tests.language.build import automaton, tree
+from language.smt.symbolic_environment import GuardSnapshot
+from tests.language.spec_builders import automaton, tree
 
 SPEC = """language: 1
 automaton: flowing

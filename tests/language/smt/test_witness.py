@@ -12,9 +12,9 @@ from language.ir.ops import Expr, Value
 from language.lowering.expressions import lower_expression
 from language.model.automaton import Automaton
 from language.numerics.evaluate import evaluate
-from language.smt.guard_snapshot import GuardSnapshot
 from language.smt.query_engine import QueryEngine, Witness
-from tests.language.build import SHIPPED, automaton, problem_lines, raised_problems, tree
+from language.smt.symbolic_environment import GuardSnapshot
+from tests.language.spec_builders import SHIPPED, automaton, problem_lines, raised_problems, tree
 
 STOP = """language: 1
 automaton: stop

@@ -11,10 +11,10 @@ from hypothesis import given, strategies as st
 
 from language.ir.ops import Expr, Ref
 from language.lowering.expressions import lower_expression
-from language.smt.linear_bounds import is_disproved_by_bounds
+from language.smt.bound_propagation import is_disproved_by_bounds
 from language.smt.query import SolverQuery, VariableDomain
 from language.smt.z3_backend import Solver
-from tests.language.build import tree
+from tests.language.spec_builders import tree
 
 SOLVER = Solver()
 EXTENTS = {

@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 from language.text.diagnostic import Source
 from language.text.document import MAX_BYTES, MappingNode, ScalarNode, SequenceNode, read_text
 from language.text.yaml_parser import MAX_DEPTH, parse_yaml
-from tests.language.build import automaton, problem_lines, raised_problems
+from tests.language.spec_builders import automaton, problem_lines, raised_problems
 
 
 def read(text: str) -> MappingNode:

@@ -9,9 +9,9 @@ from language.expressions.units import Dimension
 from language.lowering.expressions import lower_expression
 from language.numerics.evaluate import evaluate
 from language.text.diagnostic import Problems
-from language.typecheck.environment import NameEnvironment
 from language.typecheck.infer import TypeChecker
-from tests.language.build import automaton, dimension, problem_labels, problem_lines, tree
+from language.typecheck.name_environment import NameEnvironment
+from tests.language.spec_builders import automaton, dimension, problem_labels, problem_lines, tree
 
 UNITS = {
     "w_em": "rad/s",

@@ -22,10 +22,10 @@ from language.ir.ops import Expr, Value
 from language.lowering.expressions import lower_expression
 from language.numerics.evaluate import evaluate
 from language.text.diagnostic import Problems
-from language.typecheck.environment import NameEnvironment
 from language.typecheck.infer import TypeChecker
+from language.typecheck.name_environment import NameEnvironment
 from language.typecheck.types import ExprType
-from tests.language.build import NOWHERE, automaton, dimension, problem_lines, tree
+from tests.language.spec_builders import NOWHERE, automaton, dimension, problem_lines, tree
 
 UNITS = {"x": "m", "v": "m/s", "m": "kg", "F": "N", "t": "s", "c": "1", "i": "A", "Tk": "K"}
 NAMES: dict[str, ExprType] = {name: dimension(unit) for name, unit in UNITS.items()}

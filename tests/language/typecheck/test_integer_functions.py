@@ -12,10 +12,10 @@ from language.ir.ops import Ref
 from language.lowering.expressions import lower_expression
 from language.numerics.evaluate import evaluate
 from language.text.diagnostic import Problems
-from language.typecheck.environment import NameEnvironment
 from language.typecheck.infer import TypeChecker
+from language.typecheck.name_environment import NameEnvironment
 from language.typecheck.types import IntType
-from tests.language.build import tree
+from tests.language.spec_builders import tree
 
 RANGES = {"i": IntType(-3, 2), "j": IntType(1, 4), "k": IntType(-1, 5)}
 FUNCTIONS: dict[str, Callable[[int, int, int], int]] = {

@@ -7,13 +7,13 @@ import math
 import pytest
 from hypothesis import given, strategies as st
 
-from language.expressions.syntax_tree import SyntaxTree, TreeNumbering
+from language.expressions.syntax_tree import SyntaxTree
 from language.ir.ops import Ref
 from language.lowering.expressions import lower_expression
 from language.numerics.evaluate import evaluate
 from language.typecheck.interval import UNBOUNDED, Interval
 from language.typecheck.range_analysis import RangeAnalysis
-from tests.language.build import tree
+from tests.language.spec_builders import tree
 
 RANGES = {"a": Interval(-2.0, 3.0, True), "b": Interval(0.5, 4.0, True)}
 TEXTS = [
@@ -35,7 +35,7 @@ def ranged(text: str) -> tuple[Interval, list[str]]:
             found.append(f"{what} {part.span.column}")
 
     ranging = RangeAnalysis(
-        lambda name: RANGES.get(name, UNBOUNDED), lambda name: UNBOUNDED, TreeNumbering(), report
+        lambda name: RANGES.get(name, UNBOUNDED), lambda name: UNBOUNDED, report
     )
     return ranging.analyse(tree(text)), found
 

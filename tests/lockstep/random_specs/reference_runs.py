@@ -12,9 +12,9 @@ from language.ir.number_type import NUMBER_TYPES
 from language.ir.program import Program
 from lockstep.comparison import Verdict, compare_output
 from lockstep.tick_log import TickLog
-from tests.lockstep.random_specs.batch import QUICK, Batch
+from tests.lockstep.random_specs.combined_executable import QUICK, Batch
+from tests.lockstep.random_specs.engine_run import record_ticks
 from tests.lockstep.random_specs.mutant import Mutant
-from tests.lockstep.random_specs.running import record_ticks
 from tests.lockstep.random_specs.spec import Spec, program
 from tests.lockstep.random_specs.spec_kinds import spec_of
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from random import Random
 
-from tests.lockstep.random_specs.flowing import random_continuous_spec
-from tests.lockstep.random_specs.sampled import random_sampled_spec
+from tests.lockstep.random_specs.continuous_automata import random_continuous_spec
+from tests.lockstep.random_specs.sampled_automata import random_sampled_spec
 from tests.lockstep.random_specs.spec import Spec
 
 

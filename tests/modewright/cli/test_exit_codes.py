@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from modewright.api import explaining
+from modewright.api import pass_output as explaining
 from modewright.cli.app import app
 from modewright.cli.common.exit_codes import run_with_exit_code
 

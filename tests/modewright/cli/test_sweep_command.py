@@ -17,7 +17,7 @@ from modewright.cli.common.exit_codes import run_with_exit_code
 from sweep.execution.dask_error import ClusterError
 from sweep.store import store as store_module
 from sweep.store.store import read_store
-from tests.sweep.prepared_studies import STUDIES, quick_results
+from tests.sweep.example_studies import STUDIES, quick_results
 
 
 @pytest.fixture(autouse=True)

@@ -15,7 +15,7 @@ from modewright.cli.common.exit_codes import run_with_exit_code
 from modewright.runtime.output_files import RESULT_NAMES, STUDY_FOLDER_NAMES, OutputError
 from sweep.store.manifest import MANIFEST_NAME, seal_of
 from sweep.store.store import BLOCKS_FOLDER, LOCK_NAME
-from tests.sweep.prepared_studies import STUDIES, quick_results
+from tests.sweep.example_studies import STUDIES, quick_results
 
 
 @pytest.fixture(autouse=True)

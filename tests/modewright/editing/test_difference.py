@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from language.text.diagnostic import SpecError
+from language.text.diagnostic import MissingToolError, SpecError
 from language.text.project_files import parse_document, source_of
 from modewright.cli.app import app
 from modewright.editing.spec_diff.difference import SpecChange, diff_documents
@@ -186,6 +186,16 @@ def test_a_spec_is_compared_with_what_it_was_in_a_revision(
     assert same.exit_code == 0
     refused = CliRunner().invoke(app, ["diff", "nowhere:more", "more"])
     assert "Git has no `nowhere` here" in str(refused.exception)
+
+
+def test_without_git_a_revision_is_answered_with_the_line_that_installs_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    refused = CliRunner().invoke(app, ["diff", "HEAD:more", "more"])
+    assert isinstance(refused.exception, MissingToolError)
+    assert str(refused.exception) == "`git` is missing: apt-get install git"
 
 
 def test_a_priority_has_no_size_but_a_factor_has() -> None:

@@ -17,7 +17,7 @@ from modewright.cli.app import app
 from modewright.editing.formatter import format_text
 from modewright.editing.tokenised_text import tokenise
 from modewright.runtime.output_files import OutputError
-from tests.modewright.editing.corpus import ROOT, to_plain_data, valid_documents
+from tests.modewright.editing.example_specs import ROOT, to_plain_data, valid_documents
 
 HERE = Path(__file__).parent
 UNTIDY, TIDY = (HERE / "untidy.yaml").read_text(), (HERE / "tidy.yaml").read_text()

@@ -10,7 +10,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from expectation.test_reader import read_test
+from expectation.expectation_reader import read_test
 from language.loading.automaton_reader import read_automaton
 from language.loading.recording_map_reader import read_map
 from language.loading.scenario_reader import read_scenario
@@ -18,7 +18,7 @@ from language.loading.system_reader import read_system
 from language.overlays.calibration import read_calibration
 from language.overlays.effect_reader import read_effect
 from language.overlays.expand_document import Project, expand_document, read_document
-from language.reading.reader import Reader
+from language.readers.base_reader import Reader
 from language.text.diagnostic import Problems, Span, SpecError
 from language.text.document import Document, MappingNode, YamlNode
 from language.text.project_files import DOCUMENT_KINDS
@@ -26,7 +26,7 @@ from modewright.editing.json_schema import json_schema, schema_text
 from modewright.editing.key_shape import COMMON_KEYS, Choice, ShapeRef, alternatives_of, shapes
 from modewright.editing.node_kinds import places
 from sweep.definition.study_reader import read_study
-from tests.modewright.editing.corpus import ROOT, to_plain_data, valid_documents
+from tests.modewright.editing.example_specs import ROOT, to_plain_data, valid_documents
 
 COMMITTED = ROOT / "spec" / "modewright.schema.json"
 TAKEN_BEFORE = {"like", "effects", "calibrations", "extends"}

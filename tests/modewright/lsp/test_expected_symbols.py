@@ -9,7 +9,7 @@ import pytest
 
 from tests.modewright.lsp.client import LspClient
 from tests.modewright.lsp.heater import completion_labels
-from tests.modewright.lsp.test_alone import LONE, RUN, TEST
+from tests.modewright.lsp.test_instance_rename import LONE, RUN, TEST
 
 CHART = LONE.replace(
     "faults:",

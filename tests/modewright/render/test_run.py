@@ -6,7 +6,7 @@ from typing import Literal
 
 from rich.console import Console
 
-from engine.results.samples import Event
+from engine.results.sampled_run import Event
 from modewright.render.run import MAX_EVENTS, events_table
 
 Kind = Literal["transition", "range"]

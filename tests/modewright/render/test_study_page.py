@@ -19,7 +19,7 @@ from sweep.execution.executor import BlockResult, SerialExecutor
 from sweep.execution.study_run import run_study
 from sweep.store.row import Block
 from sweep.store.store import read_store
-from tests.sweep.prepared_studies import QUICK_EXECUTOR, make_study
+from tests.sweep.example_studies import QUICK_EXECUTOR, make_study
 
 DESIGN = ("sampling: {random: 4, seed: 3}", "sampling: {morris: 6, seed: 3}")
 

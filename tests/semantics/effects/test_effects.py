@@ -10,8 +10,8 @@ import pytest
 import yaml
 
 import modewright as mw
-from tests.language.build import ROOT
-from tests.semantics.effects.rig import run_with_effects
+from tests.language.spec_builders import ROOT
+from tests.semantics.effects.step_response import run_with_effects
 
 EXACT = 1e-9
 """RK4 with a step of 1 ms on polynomials and slow exponentials; absolute, SI."""

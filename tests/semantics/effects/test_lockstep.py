@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import modewright as mw
-from tests.language.build import project_of
+from tests.language.spec_builders import project_of
 
 PLANT = """language: 1
 variant: worn

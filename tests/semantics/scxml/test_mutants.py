@@ -19,8 +19,8 @@ from language.charts import (
 from language.charts.chart_context import ChartContext
 from language.ir.ops import Assign, Block, Op, Value
 from language.model.statechart import Chart, ChartNode
+from tests.semantics.scxml.case_execution import load_case, run_interpreted
 from tests.semantics.scxml.random_chart import random_case
-from tests.semantics.scxml.running import load_case, run_interpreted
 from tests.semantics.scxml.test_statecharts import RAW, SHOWING
 
 Patch = Callable[[pytest.MonkeyPatch], None]

@@ -8,15 +8,15 @@ from random import Random
 
 import pytest
 
-from tests.semantics.scxml.oracle import Oracle
-from tests.semantics.scxml.random_chart import random_case
-from tests.semantics.scxml.running import (
+from tests.semantics.scxml.case_execution import (
     Active,
     LoadedCase,
     load_case,
     run_compiled,
     run_interpreted,
 )
+from tests.semantics.scxml.oracle import Oracle
+from tests.semantics.scxml.random_chart import random_case
 
 FILE = Path(__file__).resolve().parents[2] / "data" / "conformance" / "statechart_cases.json"
 RAW = json.loads(FILE.read_text("utf-8"))

@@ -20,11 +20,11 @@ from sweep.analysis.sensitivity import (
 from sweep.definition.study import MORRIS_LEVELS, Study
 from sweep.design.random_draws import draw_values
 from sweep.design.sensitivity_design import STRIDE, morris_points
+from sweep.evaluation.exact_moments import scale_to_squarable
 from sweep.execution.study_run import run_study
-from sweep.measurement.exact_moments import scale_to_squarable
 from sweep.store.store import read_store
 from sweep.store.table import Reals
-from tests.sweep.prepared_studies import QUICK_EXECUTOR, ReversedExecutor, make_study, store_rows
+from tests.sweep.example_studies import QUICK_EXECUTOR, ReversedExecutor, make_study, store_rows
 
 A, B = 7.0, 0.1
 DRAWN = "  x_1: {uniform: [0.5 m, 1.5 m]}"

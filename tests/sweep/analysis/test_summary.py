@@ -26,7 +26,7 @@ from sweep.analysis.summary import Summary, summary_of
 from sweep.execution.executor import SerialExecutor
 from sweep.execution.study_run import run_study
 from sweep.store.store import Store
-from tests.sweep.prepared_studies import QUICK_EXECUTOR, make_study, quick_results, store_rows
+from tests.sweep.example_studies import QUICK_EXECUTOR, make_study, quick_results, store_rows
 
 
 def faulty(batch: Batch) -> BatchResult:

@@ -9,7 +9,7 @@ import pytest
 
 from language.text.diagnostic import Problems, SpecError
 from sweep.definition.distribution_check import log_spaced
-from tests.sweep.prepared_studies import make_study
+from tests.sweep.example_studies import make_study
 
 AXIS, DRAWN = "[0.1 1/s, 0.2 1/s, 0.4 1/s]", "{uniform: [0.5 m, 1.5 m]}"
 

@@ -10,7 +10,7 @@ from scipy.stats import qmc
 from sweep.definition.study import Distribution
 from sweep.design.random_draws import draw_values, quantile
 from sweep.design.variant import variants_of
-from tests.sweep.prepared_studies import make_study
+from tests.sweep.example_studies import make_study
 
 SHARES = np.array([0.001, 0.25, 0.5, 0.75, 0.999])
 

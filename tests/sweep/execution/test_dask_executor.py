@@ -21,9 +21,10 @@ from sweep.execution.dask_error import ClusterError
 from sweep.execution.dask_executor import DaskExecutor
 from sweep.execution.dask_worker import Answer, answer_block, pack_study
 from sweep.execution.fingerprint import describe_differences, fingerprint
-from sweep.execution.processes import WorkerError
+from sweep.execution.process_executor import WorkerError
 from sweep.execution.study_run import run_study
 from sweep.store.row import Block
+from tests.sweep.example_studies import QUICK_EXECUTOR, make_study, quick_results
 from tests.sweep.execution.test_study_run import bytes_of
 from tests.sweep.failing_workers import (
     answer_quickly,
@@ -34,7 +35,6 @@ from tests.sweep.failing_workers import (
     older_fingerprint,
     own_fingerprint,
 )
-from tests.sweep.prepared_studies import QUICK_EXECUTOR, make_study, quick_results
 
 pytestmark = pytest.mark.long
 

@@ -25,12 +25,12 @@ from sweep.analysis.summary import summary_of
 from sweep.definition.measure import StoreColumn
 from sweep.definition.study import Presentation as Shown, Study
 from sweep.execution.executor import BlockResult, SerialExecutor
-from sweep.execution.processes import MAX_DEATHS, ProcessExecutor
+from sweep.execution.process_executor import MAX_DEATHS, ProcessExecutor
 from sweep.execution.study_run import fill_store, run_study
 from sweep.store.manifest import Manifest, manifest_of
 from sweep.store.row import Block, Row
 from sweep.store.store import Store, lock_folder, open_store, read_store
-from tests.sweep.prepared_studies import (
+from tests.sweep.example_studies import (
     QUICK_EXECUTOR,
     ReversedExecutor,
     make_study,
@@ -112,7 +112,7 @@ def slow(batch: Batch) -> BatchResult:
 def test_killed_at_random_instants_and_gone_on_with_it_equals_the_undisturbed(
     tmp_path: Path,
 ) -> None:
-    """kill -9 of the process that computes and writes; tests/validation/figures/studies.py does it
+    """kill -9 of the process that computes and writes; tests/validation/evidence/studies.py does it
     20 times through the command line.
     """
     made = make_study()
@@ -190,7 +190,7 @@ def test_on_a_small_disk_a_study_goes_on_when_there_is_room(tmp_path: Path) -> N
 WORKER = """
 import os, sys
 import modewright
-from tests.sweep.prepared_studies import quick_results
+from tests.sweep.example_studies import quick_results
 from sweep.execution.worker import serve_blocks
 
 def run(batch):

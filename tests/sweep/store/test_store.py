@@ -18,8 +18,8 @@ from sweep.execution.study_run import run_study
 from sweep.store.block_file import block_file_fault
 from sweep.store.manifest import MANIFEST_NAME, seal_of
 from sweep.store.store import Store, read_store
+from tests.sweep.example_studies import QUICK_EXECUTOR, make_study
 from tests.sweep.execution.test_study_run import bytes_of
-from tests.sweep.prepared_studies import QUICK_EXECUTOR, make_study
 
 Change = Callable[[dict[str, Any]], object]
 

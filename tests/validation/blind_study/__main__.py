@@ -10,21 +10,21 @@ from collections.abc import Sequence
 from functools import partial
 from statistics import median
 
-from tests.validation.blind_study.acceptance import Bar, bars
-from tests.validation.blind_study.answer import Answer
+from tests.validation.blind_study.acceptance_criteria import Bar, bars
+from tests.validation.blind_study.case_score import Answer
 from tests.validation.blind_study.cases import GENERATOR
-from tests.validation.blind_study.catalogue import pairs_of
-from tests.validation.blind_study.control import (
+from tests.validation.blind_study.effect_catalogue import pairs_of
+from tests.validation.blind_study.label_digests import is_sealed, seals_of, write_seals
+from tests.validation.blind_study.negative_control import (
     baseline_alarm_rate,
     baseline_rate,
     majority_rate,
     permutation_score,
 )
-from tests.validation.blind_study.page import write_page
 from tests.validation.blind_study.plan import SEED, Plan, plans
+from tests.validation.blind_study.proof_page import write_page
 from tests.validation.blind_study.results_store import dask, diagnose_cases, export_study, threads
-from tests.validation.blind_study.seals import is_sealed, seals_of, write_seals
-from tests.validation.figures.store import ROOT
+from tests.validation.evidence.evidence_store import ROOT
 
 VERDICTS = ROOT / "docs" / "evidence" / "proof.parquet"
 ASKED = 0.1
@@ -90,16 +90,21 @@ def _beside(every: Sequence[Answer], seed: int) -> list[str]:
         return []
     chance = permutation_score(full, random.Random(seed))
     lines = [
-        f"permuted labels: first name right {chance:.1%}",
-        f"the most frequent label: {majority_rate(full).text}",
-        "recalibration without effects: names no effect",
+        "If the labels are permuted at random, the first name is right in "
+        f"{chance:.1%} of the cases.",
+        "If every verdict is the most frequent label, this name is right in "
+        f"{majority_rate(full).text} cases.",
+        "A recalibration of the base without effects names no effect.",
     ]
     for method, words in (
-        ("sindy", "sparse regression of the residual of the recalibrated base (PySINDy)"),
-        ("free_gain", "the effect with the largest gain in free simulation"),
+        ("sindy", "Sparse regression of the residual of the recalibrated base (PySINDy)"),
+        ("free_gain", "The choice of the effect with the largest gain in free simulation"),
     ):
-        alarms = f"; false alarms {baseline_alarm_rate(clean, method).text}" if clean else ""
-        lines.append(f"{words}: {baseline_rate(full, method).text}{alarms}")
+        line = f"{words} names the right effect in {baseline_rate(full, method).text} cases."
+        if clean:
+            alarms = baseline_alarm_rate(clean, method).text
+            line += f" It gives a false alarm in {alarms} cases without an effect."
+        lines.append(line)
     return [*lines, _compiled([*full, *clean])]
 
 
@@ -107,10 +112,10 @@ def _compiled(some: Sequence[Answer]) -> str:
     """Returns the share of the C compiler; a model of an earlier case is in the cache."""
     part = sum(one.compiler_s for one in some) / sum(one.cpu_s for one in some)
     kept = [one.cpu_s for one in some if one.plan == "full" and not _is_compiled(one)]
-    usual = f": median {median(kept):.1f} s" if kept else ""
+    usual = f" The median processor time of these cases is {median(kept):.1f} s." if kept else ""
     return (
-        f"the C compiler used {part:.0%} of the processor time; in {len(kept)} cases with an effect"
-        f" all models were in the cache{usual}"
+        f"The C compiler used {part:.0%} of the processor time. In {len(kept)} cases with an effect"
+        f" all models were in the cache.{usual}"
     )
 
 

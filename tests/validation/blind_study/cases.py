@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from tests.validation.blind_study.plan import Plan
-from tests.validation.figures.store import ROOT
+from tests.validation.evidence.evidence_store import ROOT
 
-GENERATOR = "tests.generators.concealed"
+GENERATOR = "tests.generators.blind_cases"
 Label = Mapping[str, Any]
 
 

@@ -14,7 +14,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from tests.validation.figures.store import ROOT
+from tests.validation.evidence.evidence_store import ROOT
 
 LONGEST = 900.0
 """Time after which a diagnosis is given up [s]."""
@@ -52,7 +52,7 @@ def diagnose_case(case: Path, without: tuple[str, ...] = (), is_compared: bool =
         library = [str(_library(Path(folder) / "effects", without))] if without else []
         alone = [] if is_compared else ["--alone"]
         given = [str(copy), str(found), *library, *alone]
-        command = [sys.executable, "-m", "tests.validation.blind_study.sealed", *given]
+        command = [sys.executable, "-m", "tests.validation.blind_study.isolated_diagnosis", *given]
         try:
             done = subprocess.run(
                 command,

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from modewright.workers import dask_worker as cluster_worker
+from modewright.workers import dask_entry_points as cluster_worker
 from sweep.definition.measure import StoreColumn
 from sweep.definition.study import Presentation
 from sweep.execution.dask_address import Credentials, parse_address
@@ -19,12 +19,12 @@ from sweep.store.digest import digest_of
 from sweep.store.manifest import Manifest
 from sweep.store.row import DONE, STOPPED, Block, Row
 from sweep.store.store import Store, lock_folder, open_store
-from tests.validation.blind_study.answer import Answer
+from tests.validation.blind_study.case_score import Answer
 from tests.validation.blind_study.cases import Cases, Label, generate_cases
 from tests.validation.blind_study.plan import Plan
 from tests.validation.blind_study.result import Result, diagnose_case
 from tests.validation.blind_study.result_transfer import export_results, import_results, rows_of
-from tests.validation.figures.store import CODE, ROOT, code_digest
+from tests.validation.evidence.evidence_store import CODE, ROOT, code_digest
 
 Workers = Callable[[], AbstractContextManager[Executor]]
 """What diagnoses cases, while it is open."""

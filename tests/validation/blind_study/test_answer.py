@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from tests.validation.blind_study.acceptance import bars
-from tests.validation.blind_study.answer import Answer
-from tests.validation.blind_study.control import permutation_score
+from tests.validation.blind_study.acceptance_criteria import bars
+from tests.validation.blind_study.case_score import Answer
+from tests.validation.blind_study.negative_control import permutation_score
 
 PLACES = {"actuator_lag": "inputs.T_em", "tyre_slip": "elements.vehicle", "road_grade": "flow.w_w"}
 

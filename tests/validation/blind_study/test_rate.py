@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from scipy.stats import binomtest
 
-from tests.validation.blind_study.rate import Rate, calibration_error, reliability
+from tests.validation.blind_study.proportion import Rate, calibration_error, reliability
 
 
 @pytest.mark.parametrize(("hits", "count"), [(0, 5), (5, 5), (1, 3), (96, 100), (297, 312)])

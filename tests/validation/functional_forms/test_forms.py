@@ -13,10 +13,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.generators.concealed.catalogue import CATALOGUE
-from tests.generators.concealed.twin import case_of
-from tests.validation.functional_forms.forms_compared import COMPARISONS
-from tests.validation.functional_forms.forms_truth import evaluate_path
+from tests.generators.blind_cases.effect_catalogue import CATALOGUE
+from tests.generators.blind_cases.effect_free_comparison import case_of
+from tests.validation.functional_forms.form_comparison import COMPARISONS
+from tests.validation.functional_forms.generator_forms import evaluate_path
 
 LEAST = 0.002
 """Of an effect's departure from the clean law, left by the best fit of the library's family."""

@@ -7,13 +7,13 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 
-from tests.validation.figures.store import ROOT, code_digest
+from tests.validation.evidence.evidence_store import ROOT, code_digest
 from tests.validation.paper.claims import claims
 from tests.validation.paper.manoeuvre import table_1
 from tests.validation.paper.observers import better_observer, run_studies
-from tests.validation.paper.page import FOLDER, SPECS, write_measurements_json, write_page
-from tests.validation.paper.pareto import picture, run_pareto
-from tests.validation.paper.pictures import draw
+from tests.validation.paper.paper_figures import draw
+from tests.validation.paper.pareto_front import picture, run_pareto
+from tests.validation.paper.report_page import FOLDER, SPECS, write_measurements_json, write_page
 
 SEED, SAMPLES = 2018, 200
 """Manoeuvres that nothing was tuned on."""

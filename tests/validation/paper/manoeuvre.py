@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import modewright as mw
-from tests.validation.figures.store import ROOT
+from tests.validation.evidence.evidence_store import ROOT
 
 STEP = 0.4785
 """When the torque steps [s]: 1.5 ms before a tick at 100 Hz."""

@@ -14,7 +14,7 @@ from scipy.stats import chi2
 
 import modewright as mw
 from sweep.analysis.confidence_interval import Interval, interval_of_quantile, wilson_interval
-from tests.validation.figures.store import ROOT
+from tests.validation.evidence.evidence_store import ROOT
 
 STUDY, CRUISE = "observers", "false_losses"
 CRUISE_MINUTES = 28.5 / 60.0

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import modewright as mw
-from tests.validation.figures.store import ROOT
+from tests.validation.evidence.evidence_store import ROOT
 from tests.validation.paper.claims import quick_claims
-from tests.validation.paper.page import FOLDER, PAGE, is_current
-from tests.validation.paper.pictures import FIGURES
+from tests.validation.paper.paper_figures import FIGURES
+from tests.validation.paper.report_page import FOLDER, PAGE, is_current
 
 REMADE = "docs/paper belongs to other specs: make paper"
 

@@ -19,9 +19,14 @@ from modewright.api.simulation import program as shipped
 from modewright.cli.app import app
 from modewright.cli.common.exit_codes import run_with_exit_code
 from tests.codegen.exchange.a2l.a2l_database import elements_of_kind, open_database
-from tests.codegen.exchange.a2l.link import TARGETS, link_program, read_section, symbol_addresses
-from tests.codegen.waiting import waiting_automaton
-from tests.language.build import program
+from tests.codegen.exchange.a2l.linked_programs import (
+    TARGETS,
+    link_program,
+    read_section,
+    symbol_addresses,
+)
+from tests.codegen.tunable_wait import waiting_automaton
+from tests.language.spec_builders import program
 
 NEEDS_ARM = pytest.mark.skipif(
     not shutil.which(ARM_COMPILER), reason="no compiler for ARM: make system-packages"

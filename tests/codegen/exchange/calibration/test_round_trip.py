@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from codegen.exchange.calibration.formats import FORMATS
+from codegen.exchange.calibration.file_formats import FORMATS
 from language.ir.number_type import NumberType, round_to_type, shortest_decimal
 from language.ir.program import unqualified_name
 from modewright.api.calibrations import CalibrationPage, export_calibration, import_calibration

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from codegen.exchange.fmi.archive import binary_path, build_fmu
-from codegen.exchange.fmi.content import HEADERS, emit_fmu_files, read_headers
+from codegen.exchange.fmi.fmu_files import HEADERS, emit_fmu_files, read_headers
 from codegen.exchange.fmi.variable import Version
 from codegen.toolchain.compiler import FLAGS, WARNINGS, BuildError
 from modewright.api.simulation import program

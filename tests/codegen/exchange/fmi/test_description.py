@@ -16,7 +16,7 @@ from fmpy.validation import validate_fmu
 from lark import Lark
 
 from codegen.exchange.fmi.archive import build_fmu
-from codegen.exchange.fmi.content import HEADERS, emit_fmu_files
+from codegen.exchange.fmi.fmu_files import HEADERS, emit_fmu_files
 from codegen.exchange.fmi.unit import unit_definitions, unit_name
 from codegen.exchange.fmi.variable import Version
 from modewright.api.simulation import program
@@ -225,7 +225,7 @@ def test_names_of_a_spec_may_be_words_of_the_c_around_it(version: Version, tmp_p
 
 def test_the_token_is_that_of_program_and_version() -> None:
     def tokens(values: dict[str, str]) -> list[str]:
-        from codegen.exchange.fmi.content import instantiation_token
+        from codegen.exchange.fmi.fmu_files import instantiation_token
 
         return [instantiation_token(program("estimator", values), version) for version in (2, 3)]
 

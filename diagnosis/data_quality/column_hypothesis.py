@@ -1,0 +1,326 @@
+"""Clock search: columns of a recording with a wrong clock or sign, found by the prediction error.
+
+Each column is shifted in time or negated. If the declared model then predicts far better, the
+column has that error. Unknown loads, wrong parameters and missing physics increase the prediction
+errors with and without the change.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from statistics import median
+
+import numpy as np
+
+from codegen.toolchain.compiler import BuildError
+from diagnosis.data.sampled_recording import (
+    Reals,
+    SampledRecording,
+    compared_outputs,
+    require_equal_periods,
+    resample,
+    sample_windows,
+    share_period,
+)
+from diagnosis.data_quality.finding import Finding
+from diagnosis.estimation.estimate import Estimate, evaluate
+from diagnosis.estimation.innovations import measured_noise_levels, predict_at_points
+from diagnosis.estimation.model_set import ModelSet, balance_disturbances
+from diagnosis.estimation.noise_level import disturbance_units
+from diagnosis.model.candidate import Candidate
+from diagnosis.model.parameter_vector import vector_of
+from engine.recordings.recording import Recording, split_by_windows
+from language.model.automaton import Automaton
+from language.model.system import ColumnMapping, RecordingMap
+from language.overlays.expand_document import Project
+from language.text.diagnostic import MissingToolError, SpecError
+from language.text.document import Document
+
+MAX_LAG, LAG_STEP = 0.48, 0.04
+"""Largest offset that is tried, and the distance of trials [s]."""
+MIN_LAG = 0.1
+"""Smallest offset [s] that is an error; actuators and sensors have smaller lags."""
+MIN_GAIN, MIN_GAIN_PER_SAMPLE = 100.0, 0.2
+"""Log-likelihood gain [nats] that a correction needs in a recording, and the gain per sample."""
+HARMLESS_GAIN_FACTOR = 1.5
+"""Factor by which the gain must exceed that of a small lag or of an unused input."""
+OTHER_COLUMN_FACTOR = 1.15
+"""The same for another column: a late torque and an early speed have similar effects."""
+SHARED_FRACTION = 0.6
+"""Fraction of the erroneous recordings that must agree for an error to apply to all."""
+CLOCK_TOLERANCE = 0.06
+"""Lags within this distance [s] are the same offset."""
+HIGH_PASS_TIME = 0.4
+"""Window [s] of the moving mean that is removed from innovations: slow parts carry no timing."""
+UNUSED_FACTOR = 1e-6
+"""Factor that makes an input nearly 0 but keeps its sign, to test the model without it."""
+
+
+@dataclass(frozen=True)
+class ColumnHypothesis:
+    """A change of a column: advanced by `lag` [s], negated (`factor` -1) or not used (`factor` 0).
+
+    `column` counts the inputs first, then the compared outputs.
+    """
+
+    column: int
+    lag: float = 0.0
+    factor: int = 1
+
+    @property
+    def is_error(self) -> bool:
+        """Whether the change is an error: a negation, or a lag from `MIN_LAG` (0.1 s) on.
+
+        False for a smaller lag, which is usual, and for an input that is not used.
+        """
+        return self.factor < 0 or abs(self.lag) >= MIN_LAG
+
+    def is_similar(self, other: ColumnHypothesis) -> bool:
+        """Return whether two hypotheses have the same column and factor, and lags within 0.06 s.
+
+        The limit is `CLOCK_TOLERANCE`.
+        """
+        near = abs(self.lag - other.lag) <= CLOCK_TOLERANCE
+        return near and (self.column, self.factor) == (other.column, other.factor)
+
+
+@dataclass(frozen=True)
+class ColumnError:
+    """The correction of an error in one recording, or in all of them if `recording` is ""."""
+
+    hypothesis: ColumnHypothesis
+    recording: str
+
+
+def find_clock_and_sign_errors(
+    document: Document,
+    project: Project,
+    automaton: Automaton,
+    mapping: RecordingMap,
+    recordings: Sequence[Recording],
+) -> list[Finding] | None:
+    """Return findings on wrong clocks and signs, or None if the model cannot be used.
+
+    The findings are errors of kind `sign` or `clock_offset`, those of `find_column_errors`. A
+    window with too few samples (`sample_windows`, `decimate`), or without a value of an input, is
+    left out. None is returned if no window remains, if the model does not compile or no C compiler
+    works, if the recordings have different rates, or if the model cannot be linearised.
+    """
+    seen = compared_outputs(mapping, automaton)
+    sampled: list[SampledRecording] = []
+    for piece in (piece for recording in recordings for piece in split_by_windows(recording)):
+        with suppress(ValueError, KeyError):
+            sampled += sample_windows(piece, mapping, automaton, seen)
+    if not sampled:
+        return None
+    series: list[SampledRecording] = []
+    for one in share_period(sampled):
+        with suppress(ValueError):
+            series += resample([one], automaton, seen, False)
+    if not series:
+        return None
+    drifts = balance_disturbances(document, automaton)
+    model_set = ModelSet(document, project, automaton, (), tuple(series), seen, drifts)
+    try:
+        require_equal_periods(series)
+        found = find_column_errors(model_set.compile_candidate(()), series)
+    except (SpecError, MissingToolError, BuildError, ValueError, OSError):
+        return None
+    names = [*automaton.inputs, *seen]
+    columns = {column.to or column.compare: column for column in mapping.columns.values()}
+    return [_to_finding(columns[names[one.hypothesis.column]], one) for one in found]
+
+
+def _to_finding(column: ColumnMapping, error: ColumnError) -> Finding:
+    """Return the finding for an error of a column."""
+    called = f"input `{column.name}`" if column.to else f"`{column.name}`"
+    if error.hypothesis.factor < 0:
+        text = f"{called} has the wrong sign: it moves against what the model gives"
+        return Finding("sign", error.recording, column.name, text, "error")
+    way = "late" if error.hypothesis.lag > 0.0 else "early"
+    text = f"the clock of {called} is {abs(error.hypothesis.lag):.2f} s {way}"
+    return Finding("clock_offset", error.recording, column.name, text, "error")
+
+
+def find_column_errors(
+    candidate: Candidate, series: Sequence[SampledRecording]
+) -> list[ColumnError]:
+    """Return the error common to all recordings, or those of single recordings; the first suffices.
+
+    Recordings not longer than four times `MAX_LAG` (0.48 s) are left out. An error needs `MIN_GAIN`
+    (100 nats) and `MIN_GAIN_PER_SAMPLE` (0.2) and must exceed the gains of small lags and unused
+    inputs by `HARMLESS_GAIN_FACTOR` and those of other columns by `OTHER_COLUMN_FACTOR`. It is
+    common if at least two, a third of all recordings and more than `SHARED_FRACTION` of those with
+    an error agree; its lag is their median. An error of a single recording counts only if its
+    column has the same error wherever it has one.
+    """
+    series = [one for one in series if float(one.period) * one.count > 4.0 * MAX_LAG]
+    if not series:
+        return []
+    gains = hypothesis_gains(candidate, series)
+    min_gains = [max(MIN_GAIN, MIN_GAIN_PER_SAMPLE * one.count) for one in series]
+    own = [
+        _clearest_hypothesis({hypothesis: float(g[k]) for hypothesis, g in gains.items()}, least)
+        for k, least in enumerate(min_gains)
+    ]
+    whole = {hypothesis: float(np.sum(g[np.isfinite(g)])) for hypothesis, g in gains.items()}
+    shared = _clearest_hypothesis(whole, sum(min_gains)) if len(series) > 1 else None
+    errors = [one for one in own if one]
+    similar = [one for one in errors if shared and one.is_similar(shared)]
+    if (
+        shared
+        and len(similar) > SHARED_FRACTION * len(errors)
+        and len(similar) >= max(2.0, len(series) / 3.0)
+    ):
+        lag = median(one.lag for one in similar)
+        return [ColumnError(dataclasses.replace(shared, lag=lag), "")]
+    named = zip(own, series, strict=True)
+    return [
+        ColumnError(hypothesis, one.name)
+        for hypothesis, one in named
+        if hypothesis and _is_uniform(hypothesis, own)
+    ]
+
+
+def _is_uniform(
+    hypothesis: ColumnHypothesis, hypotheses: Sequence[ColumnHypothesis | None]
+) -> bool:
+    """Return whether a column has the same error in every recording that has one.
+
+    Different errors rather indicate missing physics.
+    """
+    return all(
+        one.is_similar(hypothesis) for one in hypotheses if one and one.column == hypothesis.column
+    )
+
+
+def hypothesis_gains(
+    candidate: Candidate, series: Sequence[SampledRecording]
+) -> Mapping[ColumnHypothesis, Reals]:
+    """Return the log-likelihood gain [nats] of each hypothesis in each recording (recordings,).
+
+    Hypotheses are lags from -`MAX_LAG` to `MAX_LAG` in steps of `LAG_STEP` (without 0) and the
+    negation of each input and output, and each input not used. Inputs that are constant in a
+    recording are not tested. The gain is -inf in a recording where the model diverges.
+    """
+    inputs = series[0].inputs.shape[1]
+    moving_inputs = [
+        k for k in range(inputs) if all(float(s.inputs[:, k].std()) > 0.0 for s in series)
+    ]
+    seen = range(inputs, inputs + series[0].measured.shape[1])
+    reference = [apply_hypothesis(one, ColumnHypothesis(0)) for one in series]
+    base = _evaluate_declared(candidate, reference)
+    before = _high_pass_costs(base, reference)
+    count = round(MAX_LAG / LAG_STEP)
+    lags = [k * LAG_STEP for k in range(-count, count + 1) if k]
+    hypotheses = [ColumnHypothesis(k, lag) for k in (*moving_inputs, *seen) for lag in lags]
+    hypotheses += [ColumnHypothesis(k, factor=-1) for k in (*moving_inputs, *seen)]
+    hypotheses += [ColumnHypothesis(k, factor=0) for k in moving_inputs]
+    found = {}
+    for hypothesis in hypotheses:
+        right = [apply_hypothesis(one, hypothesis) for one in series]
+        model = base if hypothesis.factor == 1 else _evaluate_declared(candidate, right)
+        found[hypothesis] = _finite_gains(before, _high_pass_costs(model, right))
+    return found
+
+
+def apply_hypothesis(series: SampledRecording, hypothesis: ColumnHypothesis) -> SampledRecording:
+    """Return the inner part of a recording with a hypothesis applied to its column.
+
+    `MAX_LAG` seconds are cut off at both ends, so that every lag has values; the column is advanced
+    by the lag, rounded to samples, and multiplied by the factor (`UNUSED_FACTOR` instead of 0).
+    `start` of the result is still that of the recording.
+    """
+    margin = round(MAX_LAG / float(series.period))
+    late = round(hypothesis.lag / float(series.period))
+    inside = slice(margin, series.count - margin)
+    moved = slice(inside.start + late, inside.stop + late)
+    factor = hypothesis.factor or UNUSED_FACTOR
+    inputs, measured = series.inputs[inside].copy(), series.measured[inside].copy()
+    count = inputs.shape[1]
+    if hypothesis.column < count:
+        inputs[:, hypothesis.column] = factor * series.inputs[moved, hypothesis.column]
+    else:
+        measured[:, hypothesis.column - count] = (
+            factor * series.measured[moved, hypothesis.column - count]
+        )
+    return dataclasses.replace(series, inputs=inputs, measured=measured)
+
+
+def _evaluate_declared(candidate: Candidate, series: Sequence[SampledRecording]) -> Estimate:
+    """Return the declared model with disturbances that let it follow the recordings."""
+    noise_levels = measured_noise_levels(series, {})
+    noise_levels = dataclasses.replace(
+        noise_levels, process=disturbance_units(candidate, series, {})
+    )
+    return evaluate(candidate, series, noise_levels, vector_of(candidate, len(series), {}))
+
+
+def _high_pass_costs(model: Estimate, series: Sequence[SampledRecording]) -> Reals:
+    """Return the negative log-likelihood [nats] of the high-pass filtered innovations
+    (recordings,).
+
+    It is infinite for a recording in which the run diverged.
+    """
+    values, found = [model.values(0)] * len(series), []
+    (there,) = predict_at_points(
+        model.candidate, series, [values], model.gains, model.noise_levels.huber_limits
+    )
+    for one, done, missed, counts in zip(
+        series, there.done.tolist(), there.by_recording, there.counts, strict=True
+    ):
+        quick = _high_pass(missed, float(one.period))
+        spread = np.log(np.maximum(_column_means(quick**2), 1e-300))
+        whole = done == one.count
+        found.append(float(np.sum(0.5 * counts * spread)) if whole else np.inf)
+    return np.array(found)
+
+
+def _column_means(squares: Reals) -> Reals:
+    """Return the mean of the known values of each column."""
+    if np.isnan(squares).any():
+        return np.asarray(np.nanmean(squares, axis=0), dtype=np.float64)
+    found: Reals = squares.sum(axis=0) / len(squares)
+    return found
+
+
+def _high_pass(innovations: Reals, period: float) -> Reals:
+    """Return innovations (samples, outputs) without their moving mean."""
+    width = max(1, round(HIGH_PASS_TIME / period))
+    known = np.where(np.isfinite(innovations), innovations, 0.0)
+    kernel = np.ones(width) / width
+    slow = np.array([np.convolve(column, kernel, mode="same") for column in known.T]).T
+    found: Reals = innovations - slow
+    return found
+
+
+def _finite_gains(before: Reals, after: Reals) -> Reals:
+    """Return the gains (recordings,), -inf where the
+    model diverges with or without the hypothesis.
+    """
+    known = np.isfinite(before) & np.isfinite(after)
+    found = np.where(known, before, 0.0) - np.where(known, after, 0.0)
+    return np.where(known, found, -np.inf)
+
+
+def _clearest_hypothesis(
+    gains: Mapping[ColumnHypothesis, float], min_gain: float
+) -> ColumnHypothesis | None:
+    """Return the hypothesis with the largest gain; None if that is not a clear error.
+
+    Its gain must reach `min_gain` and exceed the gains of harmless changes and of other columns by
+    their factors.
+    """
+    best = max(gains, key=lambda one: gains[one])
+    if not best.is_error or gains[best] < min_gain:
+        return None
+    small = max([0.0, *[gain for one, gain in gains.items() if not one.is_error]])
+    other = max([0.0, *[gain for one, gain in gains.items() if one.column != best.column]])
+    return (
+        best
+        if gains[best] > max(HARMLESS_GAIN_FACTOR * small, OTHER_COLUMN_FACTOR * other)
+        else None
+    )

@@ -1,0 +1,277 @@
+"""Unit correction: another unit of a column, or two exchanged columns, that explain a mismatch.
+
+Each correction is tested by a simulation under the corrected recording.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.data_quality.finding import Finding
+from diagnosis.data_quality.model_agreement import (
+    MIN_PIECE,
+    OutputAgreement,
+    compare_with_simulation,
+    most_excited_piece,
+)
+from diagnosis.data_quality.reference_model import ReferenceModel
+from diagnosis.data_quality.unit_sign_clock_errors import SHARED_FRACTION, UNIT_FACTORS
+from engine.recordings.recording import Channel, Recording, split_by_windows
+from language.expressions.units import are_compatible, parse_unit
+from language.loading.recording_map_reader import column_dimension
+from language.model.automaton import Automaton
+from language.model.system import ColumnMapping
+from language.text.diagnostic import SpecError
+
+MAX_CONSISTENT_GAIN = 1.6
+"""Gains between this and its inverse are explained by wrong parameters."""
+TESTED_FACTORS = (
+    *UNIT_FACTORS,
+    (2.0 * math.pi, "rad/s", "rad/s taken for revolutions per second"),
+    (0.5 / math.pi, "rad/s", "revolutions per second taken for rad/s"),
+)
+"""Factors as in `UNIT_FACTORS`, with some that only a simulation can separate from others."""
+MIN_DISTANCE = 0.7
+"""Smallest distance from the model (the logarithm of a gain of 2) that a correction must remove."""
+MAX_GAIN = 6.0
+"""Largest gain of an output, or of its inverse, after a correction of its unit.
+
+A simulation that starts with a speed in a wrong unit has large errors.
+"""
+SURE_CORRELATION = 0.9
+"""Correlation above which the unit that follows from the gain needs no simulation."""
+MAX_SAMPLE_TIME, MAX_SAMPLE_STEPS = 0.5, 200
+"""Sample period [s] and number of model steps from which a time in milliseconds is tested."""
+MAX_TESTED_RECORDINGS = 3
+"""Number of inconsistent recordings in which corrections are tested."""
+
+
+@dataclass(frozen=True)
+class ColumnCorrection:
+    """A correction: a column divided by `factor`, or exchanged with the column `other`."""
+
+    column: str
+    factor: float = 1.0
+    other: str = ""
+    reason: str = ""
+
+    def apply(self, recording: Recording) -> Recording:
+        """Return a recording with the correction applied; `recording` is not changed.
+
+        The times and values of both columns are exchanged, or the values divided by `factor`.
+        KeyError without the column.
+        """
+        channels = dict(recording.channels)
+        one = channels[self.column]
+        if self.other:
+            two = channels[self.other]
+            channels[self.column] = Channel(one.column, two.times, two.values)
+            channels[self.other] = Channel(two.column, one.times, one.values)
+        else:
+            values = tuple((one.array / self.factor).tolist())
+            channels[self.column] = Channel(one.column, one.times, values)
+        return dataclasses.replace(recording, channels=channels)
+
+    def to_finding(self, recording: str) -> Finding:
+        """Return the error on a recording, or on all of them for the name "".
+
+        Its kind is `swap` for an exchange, else `unit`, with the reason as a question.
+        """
+        if self.other:
+            text = f"`{self.column}` and `{self.other}` are exchanged: they go with the model "
+            return Finding("swap", recording, self.column, text + "the other way round", "error")
+        share = f"{self.factor:.3g} times" if self.factor > 1.0 else f"1/{1.0 / self.factor:.3g} of"
+        text = f"`{self.column}` is {share} what goes with the model: {self.reason}?"
+        return Finding("unit", recording, self.column, text, "error")
+
+
+def find_corrections(
+    agreements: Sequence[OutputAgreement],
+    recordings: Sequence[Recording],
+    reference: ReferenceModel,
+    findings: Sequence[Finding] = (),
+) -> list[Finding]:
+    """Return findings on corrections of recordings that do not agree with the model.
+
+    An output disagrees if |log gain| + 1 - |correlation| exceeds `MIN_DISTANCE` (0.7). At most
+    `MAX_TESTED_RECORDINGS` (3), those of largest distance, are simulated with each possible factor
+    or exchange of columns; a correction must make all outputs agree, and the nearest one is taken.
+    A recording with a unit error in `findings` is skipped if all its outputs correlate by more than
+    `SURE_CORRELATION`. If all recordings that were corrected (at least two) have the same
+    correction, and `SHARED_FRACTION` of all disagree, it is reported once for all.
+    """
+    by_name = {one.name: [r for r in agreements if r.recording == one.name] for one in recordings}
+    sure = {
+        name
+        for f in findings
+        if f.kind == "unit"
+        for name in ([f.recording] if f.recording else by_name)
+    }
+    inconsistent = [
+        one
+        for one in recordings
+        if any(_is_inconsistent(r) for r in by_name[one.name])
+        and not (
+            one.name in sure
+            and all(abs(r.correlation) > SURE_CORRELATION for r in by_name[one.name])
+        )
+    ]
+    inconsistent = sorted(
+        inconsistent, key=lambda one: -max(_distance(r) for r in by_name[one.name])
+    )
+    corrections: dict[str, ColumnCorrection] = {}
+    for recording in inconsistent[:MAX_TESTED_RECORDINGS]:
+        part = most_excited_piece(split_by_windows(recording)[0], MIN_PIECE)
+        most = max(_distance(r) for r in by_name[recording.name]) - MIN_DISTANCE
+        best = _best_correction(part, list(dict.fromkeys(corrections.values())), most, reference)
+        possible = _candidate_corrections(recording, reference.automaton, by_name[recording.name])
+        best = best or _best_correction(part, possible, most, reference)
+        if best is not None:
+            corrections[recording.name] = best
+    distinct = set(corrections.values())
+    if (
+        len(distinct) == 1
+        and len(inconsistent) >= max(2.0, SHARED_FRACTION * len(recordings))
+        and len(corrections) > 1
+    ):
+        return [distinct.pop().to_finding("")]
+    return [correction.to_finding(name) for name, correction in corrections.items()]
+
+
+def find_millisecond_time(recording: Recording, reference: ReferenceModel) -> list[Finding]:
+    """Return a finding if the time of a recording may be in milliseconds, else an empty list.
+
+    It may be if the shortest median period of a channel is at least `MAX_SAMPLE_TIME` (0.5 s) and
+    `MAX_SAMPLE_STEPS` (200) steps of the model. The finding is an error if all outputs agree with
+    the model after a division of the time by 1000, else a warning.
+    """
+    usual = min(
+        (
+            float(np.median(np.diff(one.seconds)))
+            for one in recording.channels.values()
+            if len(one.times) > 1
+        ),
+        default=0.0,
+    )
+    steps = usual / float(reference.automaton.step)
+    if usual < MAX_SAMPLE_TIME or steps < MAX_SAMPLE_STEPS:
+        return []
+    text = (
+        f"a sample each {usual:.4g} s is one in {steps:.4g} steps of `{reference.automaton.name}`"
+    )
+    try:
+        part = most_excited_piece(split_by_windows(_scale_time(recording))[0], MIN_PIECE)
+        after = compare_with_simulation([part], reference)
+    except (SpecError, ArithmeticError):
+        after = []
+    is_sure = bool(after) and all(_is_consistent(agreement) for agreement in after)
+    text += ": is the time in ms?" + (" Then it goes with the model" if is_sure else "")
+    return [Finding("time", recording.name, "", text, "error" if is_sure else "warning")]
+
+
+def _scale_time(recording: Recording) -> Recording:
+    """Return a recording with its time divided by 1000, without windows."""
+    channels = {
+        name: Channel(one.column, tuple(time / 1000 for time in one.times), one.values)
+        for name, one in recording.channels.items()
+    }
+    return Recording(recording.name, channels, recording.end / 1000, recording.start / 1000)
+
+
+def _best_correction(
+    recording: Recording,
+    corrections: Sequence[ColumnCorrection],
+    max_distance: float,
+    reference: ReferenceModel,
+) -> ColumnCorrection | None:
+    """Return the correction after which all outputs agree with the model, the one at least
+    distance.
+
+    The distance must be below `max_distance`; the result is None if there is no such correction.
+    """
+    distances = {}
+    for correction in corrections:
+        try:
+            after = compare_with_simulation([correction.apply(recording)], reference)
+        except (SpecError, ArithmeticError):
+            continue
+        if after and all(_is_consistent(agreement) for agreement in after):
+            distances[correction] = max(_distance(agreement) for agreement in after)
+    near = [one for one, distance in distances.items() if distance < max_distance]
+    return min(near, key=lambda one: distances[one], default=None)
+
+
+def _candidate_corrections(
+    recording: Recording, automaton: Automaton, agreements: Sequence[OutputAgreement]
+) -> list[ColumnCorrection]:
+    """Return the corrections that are possible for the used columns, by their dimensions.
+
+    A factor that leaves a gain of an output above `MAX_GAIN` is left out.
+    """
+    gains = {agreement.channel: agreement.gain for agreement in agreements}
+    used = {
+        name: channel.column
+        for name, channel in recording.channels.items()
+        if channel.column.to in automaton.inputs or channel.column.compare in automaton.outputs
+    }
+    found = [
+        ColumnCorrection(name, factor, reason=_reason_with_unit(reason, column))
+        for name, column in used.items()
+        for factor, unit, reason in TESTED_FACTORS
+        if not unit or are_compatible(parse_unit(unit).dimension, column_dimension(column))
+        if abs(math.log(abs(gains.get(name, factor)) / factor)) < math.log(MAX_GAIN)
+    ]
+    found += [
+        ColumnCorrection(one, other=two)
+        for one, two in itertools.combinations(used, 2)
+        if column_dimension(used[one]) == column_dimension(used[two])
+        and (used[one].to is None) == (used[two].to is None)
+    ]
+    return found
+
+
+def _reason_with_unit(reason: str, column: ColumnMapping) -> str:
+    """Return a reason with the likely unit added to a factor of a thousand."""
+    text = column.unit.text
+    if "thousand times larger" in reason and not text.startswith("k"):
+        return f"{reason}, as k{text} taken for {text}"
+    return reason
+
+
+def _is_inconsistent(agreement: OutputAgreement) -> bool:
+    """Return whether an output disagrees with the model apart from its sign."""
+    return abs(math.log(abs(agreement.gain))) + 1.0 - abs(agreement.correlation) > MIN_DISTANCE
+
+
+def _is_consistent(agreement: OutputAgreement) -> bool:
+    """Return whether an output agrees with the model but for its parameters."""
+    return agreement.is_clear and 1.0 / MAX_CONSISTENT_GAIN < agreement.gain < MAX_CONSISTENT_GAIN
+
+
+def _distance(agreement: OutputAgreement) -> float:
+    """Return the distance of an output from the model: |log gain| + 1 - correlation."""
+    return abs(math.log(abs(agreement.gain))) + 1.0 - max(agreement.correlation, 0.0)
+
+
+def replace_corrected(findings: Sequence[Finding], corrections: Sequence[Finding]) -> list[Finding]:
+    """Return findings with corrections in place of other findings on the same recordings.
+
+    A unit correction of a channel and recording that already have a unit finding is dropped. With a
+    correction of all recordings ("") only corrections are returned; else they come last.
+    """
+    same = {(f.channel, f.recording) for f in findings if f.kind == "unit"}
+    new = [
+        cure
+        for cure in corrections
+        if cure.kind != "unit" or (cure.channel, cure.recording) not in same
+    ]
+    where = {cure.recording for cure in new}
+    if "" in where:
+        return list(new)
+    return [*[f for f in findings if f.recording not in where], *new]

@@ -1,0 +1,337 @@
+"""Unit, sign and clock errors: conclusions from the agreement of recordings with a simulation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from statistics import median
+
+from diagnosis.data_quality.finding import Finding, Severity
+from diagnosis.data_quality.model_agreement import OutputAgreement
+from engine.recordings.recording import Recording
+from language.expressions.units import Dimension, are_compatible, parse_unit
+from language.loading.recording_map_reader import column_dimension
+from language.model.automaton import Automaton
+from language.model.system import RecordingMap
+
+OFFSET_ERROR, OFFSET_WARNING = 0.1, 0.08
+"""Clock offsets [s] that are an error and a warning;
+actuators and sensors have lags up to 0.05 s.
+"""
+SINGLE_RECORDING_MARGIN = 0.1
+"""Increase of the correlation from which a lag in a single recording of several is reported."""
+CLOCK_TOLERANCE = 0.04
+"""Lags within this distance [s] are the same offset."""
+SHARED_FRACTION = 0.6
+"""Fraction of the recordings from which an error is attributed to all."""
+MAX_SCALE_RATIO = 2.5
+"""Ratio of measured to simulated above which, or below whose inverse, the scale is reported."""
+FACTOR_TOLERANCE = 0.3
+"""Relative distance from a factor of units; parameters of a rough model are 20 % wrong."""
+SHARED_FACTOR_TOLERANCE = 0.5
+"""The same if all outputs have the same factor, which missing physics seldom causes."""
+UNIT_FACTORS: Sequence[tuple[float, str, str]] = (
+    (30.0 / math.pi, "rad/s", "rpm taken for rad/s"),
+    (math.pi / 30.0, "rad/s", "rad/s taken for rpm"),
+    (3.6, "m/s", "km/h taken for m/s"),
+    (1.0 / 3.6, "m/s", "m/s taken for km/h"),
+    (180.0 / math.pi, "rad", "deg taken for rad"),
+    (math.pi / 180.0, "rad", "rad taken for deg"),
+    (180.0 / math.pi, "rad/s", "deg/s taken for rad/s"),
+    (1000.0, "", "a unit a thousand times smaller than the map says"),
+    (1.0e-3, "", "a unit a thousand times larger than the map says"),
+)
+"""Factor of measured to simulated, the unit for which it can occur, and its cause."""
+
+
+def find_unit_sign_clock_errors(
+    agreements: Sequence[OutputAgreement],
+    automaton: Automaton,
+    mapping: RecordingMap,
+    recordings: Sequence[Recording],
+) -> list[Finding]:
+    """Return findings on signs, units and clocks, for all recordings together or for single ones.
+
+    Only clear agreements count. With a clear agreement in fewer than two recordings the findings of
+    each are returned. Otherwise an error that at least two and more than `SHARED_FRACTION` (0.6) of
+    the recordings show is reported once; then other findings are left out unless it is a clock
+    offset. If half of the recordings have unit errors, only these are returned. A clock offset of a
+    single recording is a warning and needs an increase of the correlation by more than
+    `SINGLE_RECORDING_MARGIN`.
+    """
+    own = {
+        recording.name: _find_errors(
+            recording.name,
+            [agreement for agreement in agreements if agreement.recording == recording.name],
+            automaton,
+            mapping,
+            [recording],
+        )
+        for recording in recordings
+    }
+    clear = {agreement.recording for agreement in agreements if agreement.is_clear}
+    if len(clear) < 2:
+        return [finding for findings in own.values() for finding in findings]
+    shared = [
+        finding
+        for finding in _find_errors("", agreements, automaton, mapping, recordings)
+        if _is_shared(finding, own, agreements)
+    ]
+    outputs = {agreement.channel for agreement in agreements}
+    reported_kinds = {
+        kind for f in shared if f.channel not in outputs for kind in _similar_kinds(f.kind)
+    }
+    rest = [
+        f
+        for fs in own.values()
+        for f in fs
+        if not _has_similar(shared, f) and f.kind not in reported_kinds
+    ]
+    units = [f for findings in own.values() for f in findings if f.kind == "unit"]
+    if 2 * len({f.recording for f in units}) >= len(recordings):
+        units = [f for f in shared if f.kind == "unit"] or units
+        return units  # Single recordings show which unit it is.
+    if any(finding.kind != "clock_offset" for finding in shared):
+        return shared  # Other findings are consequences of these.
+    sure = {
+        r.recording
+        for r in agreements
+        if r.is_clear and r.correlation_gain > SINGLE_RECORDING_MARGIN
+    }
+    return [
+        *shared,
+        *[
+            _weaken_clock_finding(f)
+            for f in rest
+            if f.kind != "clock_offset" or f.recording in sure
+        ],
+    ]
+
+
+def agrees_with_other_outputs(finding: Finding, agreements: Sequence[OutputAgreement]) -> bool:
+    """Return whether a unit or scale finding is refuted by the level of the other outputs.
+
+    This is so if the median `level` of its channel is within `FACTOR_TOLERANCE` (30 %) of that of
+    the other clear outputs with a gain within `MAX_SCALE_RATIO`, in the same recordings. False for
+    other kinds of findings, without such outputs, or if a level is 0. Missing physics can make one
+    output oscillate much more than in the simulation, which looks like a scale error; a wrong unit
+    would change its level relative to the others.
+    """
+    if finding.kind not in ("unit", "scale"):
+        return False
+    here = [r for r in agreements if finding.recording in ("", r.recording)]
+    own = [r.level for r in here if r.channel == finding.channel]
+    right = [r for r in here if r.is_clear and 1.0 / MAX_SCALE_RATIO < r.gain < MAX_SCALE_RATIO]
+    others = [r.level for r in right if r.channel != finding.channel]
+    if not own or not others or not min(*own, *others) > 0.0:
+        return False
+    return abs(math.log(median(own) / median(others))) < math.log(1.0 + FACTOR_TOLERANCE)
+
+
+def _is_shared(
+    finding: Finding,
+    by_recording: Mapping[str, Sequence[Finding]],
+    agreements: Sequence[OutputAgreement],
+) -> bool:
+    """Return whether most of the recordings with a
+    clear agreement of the channel have this finding.
+    """
+    clear = {r.recording for r in agreements if r.is_clear and r.channel == finding.channel}
+    count = sum(_has_similar(findings, finding) for findings in by_recording.values())
+    if not clear:  # An input: if one output alone is clear, the finding names that output.
+        clear = {r.recording for r in agreements if r.is_clear}
+        kinds = _similar_kinds(finding.kind)
+        count = sum(any(f.kind in kinds for f in findings) for findings in by_recording.values())
+    return count >= 2 and count > SHARED_FRACTION * len(clear)
+
+
+def _weaken_clock_finding(finding: Finding) -> Finding:
+    """Return a clock finding as a warning: in single recordings an actuator may be slow instead."""
+    if finding.kind != "clock_offset":
+        return finding
+    return replace(finding, severity="warning")
+
+
+def _has_similar(findings: Sequence[Finding], finding: Finding) -> bool:
+    """Return whether findings contain one of a similar kind on the same channel."""
+    return any(
+        f.channel == finding.channel and f.kind in _similar_kinds(finding.kind) for f in findings
+    )
+
+
+def _similar_kinds(kind: str) -> tuple[str, ...]:
+    """Return the kinds that describe the same error: unit and scale, or the kind itself."""
+    return ("unit", "scale") if kind in ("unit", "scale") else (kind,)
+
+
+def _find_errors(
+    name: str,
+    agreements: Sequence[OutputAgreement],
+    automaton: Automaton,
+    mapping: RecordingMap,
+    recordings: Sequence[Recording],
+) -> list[Finding]:
+    """Return findings from the clear agreements of one recording, or of all for the name "".
+
+    Clock offsets are only reported if there are no sign and unit errors.
+    """
+    clear = [agreement for agreement in agreements if agreement.is_clear]
+    by_channel = {
+        channel: [r for r in clear if r.channel == channel]
+        for channel in dict.fromkeys(r.channel for r in clear)
+    }
+    if not by_channel:
+        return []
+    one = _AgreementsByChannel(name, recordings, automaton, mapping, by_channel)
+    return [*one.find_sign_errors(), *one.find_unit_errors()] or one.find_clock_errors()
+
+
+class _AgreementsByChannel:
+    """The clear agreements of one recording or of all of them, by channel."""
+
+    def __init__(
+        self,
+        name: str,
+        recordings: Sequence[Recording],
+        automaton: Automaton,
+        mapping: RecordingMap,
+        agreements: Mapping[str, Sequence[OutputAgreement]],
+    ) -> None:
+        self.name = name
+        self.mapping = mapping
+        self.relations = agreements
+        self.gains = {name: median(r.gain for r in rs) for name, rs in agreements.items()}
+        self.lags = {name: median(r.significant_lag for r in rs) for name, rs in agreements.items()}
+        self.inputs = [
+            channel.column.name
+            for channel in recordings[0].channels.values()
+            if channel.column.to in automaton.inputs
+            if any(_varies(recording, channel.column.name) for recording in recordings)
+        ]
+
+    def _attribute(self, channels: Sequence[str]) -> tuple[str, str]:
+        """Return the channel to report and its name in a sentence:
+        an input if all outputs are affected.
+        """
+        if len(channels) == len(self.gains) and self.inputs:
+            if len(channels) > 1:
+                return self.inputs[0], f"input `{self.inputs[0]}`"
+            return channels[0], f"`{channels[0]}` or input `{self.inputs[0]}`"
+        return channels[0], f"`{channels[0]}`"
+
+    def _finding(self, kind: str, channel: str, text: str, severity: Severity) -> Finding:
+        """Return a finding on this recording."""
+        return Finding(kind, self.name, channel, text, severity)
+
+    def find_sign_errors(self) -> list[Finding]:
+        """Return errors for outputs with a negative gain; one for the input if all are negative."""
+        odd = [name for name, gain in self.gains.items() if gain < 0.0]
+        if not odd:
+            return []
+        groups = [odd] if len(odd) == len(self.gains) else [[name] for name in odd]
+        found = []
+        for group in groups:
+            channel, called = self._attribute(group)
+            text = f"{called} has the wrong sign: it moves against what the model gives"
+            found.append(self._finding("sign", channel, text, "error"))
+        return found
+
+    def find_unit_errors(self) -> list[Finding]:
+        """Return findings on outputs much larger or smaller than the simulated ones."""
+        sizes = {name: abs(gain) for name, gain in self.gains.items()}
+        odd = [n for n, size in sizes.items() if not 1.0 / MAX_SCALE_RATIO < size < MAX_SCALE_RATIO]
+        if not odd:
+            return []
+        together = len(odd) == len(sizes) and max(sizes.values()) < 1.6 * min(sizes.values())
+        found = []
+        for group in [odd] if together else [[name] for name in odd]:
+            channel, called = self._attribute(group) if together else (group[0], f"`{group[0]}`")
+            if together and channel not in sizes:
+                found.append(self._shared_scale_finding(group, channel, called))
+                continue
+            size = median(sizes[name] for name in group)
+            found.append(self._scale_finding(channel, called, size, True))
+        return found
+
+    def _shared_scale_finding(self, outputs: Sequence[str], channel: str, subject: str) -> Finding:
+        """Return the finding on all outputs: a wrong scale of the input,
+        or a unit that they share.
+        """
+        size = median(abs(self.gains[name]) for name in outputs)
+        if not _unit_error_reason(1.0 / size, column_dimension(self.mapping.columns[channel])):
+            reasons = {
+                _unit_error_reason(
+                    size, column_dimension(self.mapping.columns[name]), SHARED_FACTOR_TOLERANCE
+                )
+                for name in outputs
+            }
+            if len(reasons) == 1 and reasons != {""}:
+                both = " and ".join(f"`{name}`" for name in outputs)
+                text = f"{both} are {size:.3g} times what the model gives: {reasons.pop()}?"
+                return self._finding("unit", outputs[0], text, "error")
+        return self._scale_finding(channel, subject, 1.0 / size, False)
+
+    def _scale_finding(self, channel: str, subject: str, size: float, is_output: bool) -> Finding:
+        """Return a unit error if a factor of units explains the size,
+        else a warning on the scale.
+        """
+        dimension = column_dimension(self.mapping.columns[channel])
+        share = f"{size:.3g} times" if size > 1.0 else f"1/{1.0 / size:.3g} of"
+        source = _unit_error_reason(size, dimension)
+        what = f"{share} what the model {'gives' if is_output else 'needs'}"
+        text = f"{subject} is {what}" + (f": {source}?" if source else "")
+        if source:
+            return self._finding("unit", channel, text, "error")
+        return self._finding("scale", channel, text, "warning")
+
+    def find_clock_errors(self) -> list[Finding]:
+        """Return findings on outputs with a larger lag than actuators and sensors have."""
+        odd = [name for name, lag in self.lags.items() if abs(lag) >= OFFSET_WARNING]
+        if not odd:
+            return []
+        lags = [self.lags[name] for name in odd]
+        together = len(odd) == len(self.lags) and max(lags) - min(lags) < CLOCK_TOLERANCE
+        return [
+            self._clock_offset_finding(group, together)
+            for group in ([odd] if together else [[n] for n in odd])
+        ]
+
+    def _clock_offset_finding(self, channels: Sequence[str], is_shared: bool) -> Finding:
+        """Return the clock finding on channels: an error if most agreements have the same lag."""
+        lag = median(self.lags[name] for name in channels)
+        channel, called = (
+            self._attribute(channels) if is_shared else (channels[0], f"`{channels[0]}`")
+        )
+        later = (lag > 0.0) == (channel in self.lags)
+        text = f"the clock of {called} is {abs(lag):.2f} s {'late' if later else 'early'}"
+        if is_shared and len(channels) == 1 and self.inputs:
+            both = f"`{channels[0]}` and input `{self.inputs[0]}`"
+            text = f"the clocks of {both} are {abs(lag):.2f} s apart"
+        each = [r.significant_lag for name in channels for r in self.relations[name]]
+        steady = sum(abs(one - lag) <= CLOCK_TOLERANCE for one in each) >= SHARED_FRACTION * len(
+            each
+        )
+        is_sure = steady and abs(lag) >= OFFSET_ERROR
+        return self._finding("clock_offset", channel, text, "error" if is_sure else "warning")
+
+
+def _varies(recording: Recording, name: str) -> bool:
+    """Return whether a channel is recorded and not constant."""
+    channel = recording.channels.get(name)
+    return channel is not None and len(set(channel.values)) > 1
+
+
+def _unit_error_reason(
+    size: float, dimension: Dimension, tolerance: float = FACTOR_TOLERANCE
+) -> str:
+    """Return the unit error that explains a ratio of measured to simulated,
+    or "" if there is none.
+    """
+    near = [
+        (abs(math.log(size / factor)), reason)
+        for factor, unit, reason in UNIT_FACTORS
+        if not unit or are_compatible(parse_unit(unit).dimension, dimension)
+    ]
+    distance, reason = min(near)
+    return reason if distance < math.log(1.0 + tolerance) else ""

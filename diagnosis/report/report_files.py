@@ -1,0 +1,218 @@
+"""Report page: the files of a diagnosis - verdict, variant, figures and one HTML page."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from collections.abc import Mapping, Sequence
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from codegen.toolchain.compiler import BuildError, compiler_version
+from codegen.toolchain.templates import product_version, render_html
+from diagnosis.data_quality.finding import format_findings
+from diagnosis.model.compile_cache import node_text
+from diagnosis.model.equation_change import equation_changes
+from diagnosis.model.placed_effect import shipped_effects
+from diagnosis.report import report_text as sentences, tables
+from diagnosis.report.diagnosis_report import DiagnosisReport, verdict_to_json
+from diagnosis.report.figures import embed_svg, report_figures
+from diagnosis.report.model_comparison import ModelComparison, compare_models
+from diagnosis.report.number_text import format_probability
+from diagnosis.report.parameter_table import (
+    format_biased_parameters,
+    format_fixed_parameters,
+    parameter_rows,
+    text_of,
+)
+from diagnosis.report.reproduction import (
+    SCENARIO,
+    WINDOW,
+    format_scenario,
+    format_window_csv,
+    report_command,
+    reproduction_commands,
+)
+from diagnosis.report.summary_cards import summary_cards
+from diagnosis.report.tables import describe_residuals, whiteness_rows
+from language.overlays.name_types import format_si_unit
+from language.text.diagnostic import MissingToolError
+
+REPORT = __name__.rpartition(".")[0]
+"""The package of the report's templates."""
+DIGEST_LENGTH = 16
+"""Hexadecimal digits of SHA-256 that are shown."""
+
+
+def provenance_rows(report: DiagnosisReport) -> list[tuple[str, str, str]]:
+    """Return use, name and digest of spec, map, effects and each recording, in this order.
+
+    Training recordings come before held-out ones. A digest has `DIGEST_LENGTH` (16) hexadecimal
+    digits of SHA-256; that of a map without a file is "".
+    """
+    case = report.case
+    effects = case.effects if case.effects is not None else shipped_effects()
+    library = "\n".join(f"{one.name} {node_text(one.body)}" for one in effects)
+    columns = "\n".join(case.mapping.span.source.lines)
+    found = [
+        (
+            "spec, with all that it extends",
+            report.name,
+            _text_digest(node_text(case.document.root)),
+        ),
+        ("map of columns", case.mapping.name, _text_digest(columns) if columns else ""),
+        ("effects", f"{len(effects)} of them", _text_digest(library)),
+    ]
+    found += [("training", name, digest) for name, digest in report.verdict.inputs.items()]
+    found += [("held out", name, digest) for name, digest in report.held_out.items()]
+    return found
+
+
+def _text_digest(text: str) -> str:
+    """Return the first digits of the SHA-256 of a text."""
+    return hashlib.sha256(text.encode()).hexdigest()[:DIGEST_LENGTH]
+
+
+def tool_versions() -> str:
+    """Return the versions of modewright, Python, numpy, scipy and the C compiler in one line.
+
+    It is `modewright 1.0, Python 3.11.2, numpy 2.1, scipy 1.14, gcc ...`. The last part is the
+    version line of the C compiler, or `no C compiler` if it cannot be started.
+    """
+    try:
+        compiler = compiler_version().partition(": ")[2]
+    except (BuildError, MissingToolError):
+        compiler = "no C compiler"
+    python = f"Python {platform.python_version()}"
+    libraries = [f"{name} {metadata.version(name)}" for name in ("numpy", "scipy")]
+    return ", ".join([f"modewright {product_version()}", python, *libraries, compiler])
+
+
+def report_files(report: DiagnosisReport, variant: str, folder: Path = Path()) -> dict[str, bytes]:
+    """Return the contents of all files of a diagnosis by name; `verdict.json` is the last one.
+
+    `variant.yaml`, `report.html` and `verdict.json` are always there; with a diagnosis also
+    `<figure>.svg` and `.png`, `window.csv`, `scenario.yaml`, and the file of a discovered formula.
+    `variant` is the text of the variant file, `folder` the folder that commands on the page name.
+    Nothing is written.
+    """
+    comparisons = compare_models(report)
+    figures = report_figures(report, comparisons) if comparisons else []
+    files = {"variant.yaml": variant.encode()}
+    if report.diagnosis and report.diagnosis.equation:
+        formula = report.diagnosis.equation.formula
+        files[f"{formula.placed_effect.effect.name}.yaml"] = formula.text.encode()
+    for one in figures:
+        files[f"{one.name}.svg"] = one.picture.data("svg")
+        files[f"{one.name}.png"] = one.picture.data("png")
+    if comparisons:
+        inputs = {n: format_si_unit(i.unit.dimension) for n, i in report.automaton.inputs.items()}
+        files[WINDOW] = format_window_csv(comparisons[0].window, inputs).encode()
+        files[SCENARIO] = format_scenario(report, comparisons[0].window).encode()
+    svg = {one.name: embed_svg(one, files[f"{one.name}.svg"]) for one in figures}
+    context = {
+        **_verdict_context(report, comparisons),
+        **_model_context(report, comparisons),
+        **_data_context(report),
+        **_usage_context(report, folder),
+        "variant": variant,
+        "drawings": {one.name: one for one in figures},
+        "svg": svg,
+    }
+    files["report.html"] = _render_page(context).encode()
+    verdict = json.dumps(verdict_to_json(report.verdict), indent=2, allow_nan=False) + "\n"
+    files["verdict.json"] = verdict.encode()
+    return files
+
+
+def _verdict_context(
+    report: DiagnosisReport, comparisons: Sequence[ModelComparison]
+) -> dict[str, Any]:
+    """Return the values of the template for the verdict, the cards and the changed equations."""
+    verdict, found = report.verdict, report.diagnosis
+    placed_effects = [one.placed_effect for one in found.selection.accepted] if found else []
+    return {
+        "name": report.name,
+        "about": text_of(report.case.document.root, "about"),
+        "verdict": verdict,
+        "has_model": bool(placed_effects),
+        "laid": [placed_effect.id for placed_effect in placed_effects],
+        "headline": tables.split_code_spans(sentences.format_headline(report)),
+        "cards": summary_cards(report, comparisons[0].after if comparisons else ()),
+        "location": sentences.format_missing_location(report) if found else "",
+        "messages": verdict.messages,
+        "abouts": _effect_summaries(report),
+        "changes": equation_changes(report.case.document, placed_effects),
+        "places": tables.location_rows(verdict.location[0]) if verdict.location else [],
+        "rivals": [sentences.format_effect(one) for one in verdict.ambiguous_with],
+        "separation": sentences.format_separation(report),
+        "signals": list(zip(comparisons[0].runs.signals, comparisons[0].units, strict=True))
+        if comparisons
+        else [],
+    }
+
+
+def _effect_summaries(report: DiagnosisReport) -> list[tuple[str, str, str]]:
+    """Return name, description and signature text of each accepted effect."""
+    found = report.diagnosis
+    accepted = found.selection.accepted if found else ()
+    effects = [one.placed_effect.effect for one in accepted]
+    return [(one.name.replace("_", " "), one.about, one.signature) for one in effects]
+
+
+def _model_context(
+    report: DiagnosisReport, comparisons: Sequence[ModelComparison]
+) -> dict[str, Any]:
+    """Return the values of the template for misfits, candidates, parameters and residuals."""
+    found = report.diagnosis
+    if found is None:
+        return {"fit": [], "candidates": [], "unfitted": [], "parameters": [], "whiteness": []}
+    selection = found.selection
+    one = comparisons[0]
+    return {
+        "fit": [
+            row
+            for s in comparisons
+            for row in tables.misfit_rows(report, s.label, s.dataset, s.runs)
+        ],
+        "noise": tables.format_noise(selection, one.runs.signals, one.units),
+        "candidates": tables.candidate_rows(report, selection),
+        "unfitted": tables.unfitted_candidates(report, selection),
+        "other": format_probability(report.verdict.other),
+        "parameters": parameter_rows(report, selection),
+        "astray": format_biased_parameters(selection),
+        "whiteness": whiteness_rows(one.before, one.after, one.units, not selection.accepted),
+        "whiteness_of": one.label,
+        "left": describe_residuals(one.before, one.after, not selection.accepted),
+    }
+
+
+def _data_context(report: DiagnosisReport) -> dict[str, Any]:
+    """Return the values of the template for the recordings and their findings."""
+    return {
+        "unread": report.diagnosis.unread if report.diagnosis else (),
+        "findings": [
+            (s, tables.split_code_spans(text)) for s, text in format_findings(report.findings)
+        ],
+        "recordings": tables.recording_rows(report),
+        "untestable": tables.untestable_effects(report),
+        "fixed": format_fixed_parameters(report),
+        "thresholds": report.case.thresholds,
+    }
+
+
+def _usage_context(report: DiagnosisReport, folder: Path) -> dict[str, Any]:
+    """Return the values of the template for commands and provenance."""
+    return {
+        "commands": reproduction_commands(report, folder),
+        "made_by": report_command(report, folder),
+        "tools": tool_versions(),
+        "sources": provenance_rows(report),
+    }
+
+
+def _render_page(context: Mapping[str, Any]) -> str:
+    """Return the HTML page for the values of the template."""
+    return render_html((REPORT,), "report.html.jinja", context)

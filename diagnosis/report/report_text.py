@@ -1,0 +1,272 @@
+"""Sentences: a diagnosis in words, for the console and the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from diagnosis.criterion.threshold import Thresholds
+from diagnosis.data_quality.finding import format_findings
+from diagnosis.estimation.quantity import Quantity
+from diagnosis.localisation.location_text import PLACE_PHRASES, format_location
+from diagnosis.model.placed_effect import PlacedEffect, place_path
+from diagnosis.report.diagnosis_report import DiagnosisReport
+from diagnosis.report.number_text import format_quantity
+from diagnosis.result.effect_naming import verdict_id
+from diagnosis.result.verdict import NamedEffect
+from diagnosis.selection.candidate_search import (
+    ENTRY_THRESHOLD,
+    MAX_FITS,
+    PRUNING_FRACTION,
+    CandidateFit,
+)
+from diagnosis.selection.confusion_set import CONFUSION_GAIN, is_confusable
+from diagnosis.selection.forward_selection import Selection
+from diagnosis.validation.misfit import Misfit
+
+MAX_NAMED = 4
+"""Maximum number of rivals, windows or findings in a sentence."""
+
+
+def format_headline(report: DiagnosisReport) -> str:
+    """Return the verdict in one sentence.
+
+    An early end comes first ("Nothing is concluded yet: ..."), then unusable recordings; else the
+    sentence names the effects with their values, the effects that cannot be told apart, the nearest
+    formula or effects for an unknown cause, or the threshold that no effect reached.
+    """
+    verdict = report.verdict
+    if report.end_reason:
+        return f"Nothing is concluded yet: {report.end_reason}."
+    if report.diagnosis is None:
+        return "Nothing is concluded about the physics: these recordings are not usable."
+    if verdict.verdict == "effect":
+        named = " and ".join(_format_effect_values(one) for one in verdict.effects)
+        return f"`{report.name}` lacks {named}."
+    if verdict.verdict == "ambiguous":
+        names = [format_effect(one) for one in verdict.ambiguous_with]
+        return (
+            f"`{report.name}` lacks something, and these recordings cannot tell which of these "
+            f"it is: {'; '.join(names)}."
+        )
+    if verdict.verdict == "unknown":
+        like = _format_equation(report) or _format_nearest(report)
+        return f"`{report.name}` lacks something that none of the effects tried explains{like}."
+    return (
+        f"`{report.name}` lacks nothing that these recordings show: with its parameters "
+        f"recalibrated no effect gains the {report.case.thresholds.text} nats asked for."
+    )
+
+
+def _format_equation(report: DiagnosisReport) -> str:
+    """Return the discovered formula as the end of a sentence; "" without one."""
+    found = report.diagnosis.equation if report.diagnosis else None
+    if found is None:
+        return ""
+    where = f"{PLACE_PHRASES[found.location.section]} {found.location.place}"
+    return f"; it is like `{found.text}` {where}"
+
+
+def _format_nearest(report: DiagnosisReport) -> str:
+    """Return the effects nearest to an unknown cause as the end of a sentence; "" without any."""
+    names = [format_effect(one) for one in report.verdict.ambiguous_with]
+    return f"; the nearest is {' or '.join(names[:MAX_NAMED])}" if names else ""
+
+
+def format_effect(effect: NamedEffect) -> str:
+    """Return an effect with its place in words, such as `viscous friction in the balance of w`.
+
+    Underscores of the name become spaces; the phrases are `PLACE_PHRASES`.
+    """
+    section, _, name = effect.place.partition(".")
+    return f"{effect.id.replace('_', ' ')} {PLACE_PHRASES[section]} {name}"
+
+
+def _format_effect_values(effect: NamedEffect) -> str:
+    """Return an effect with its place and parameter values."""
+    values = ", ".join(
+        f"{name} = {format_fitted_quantity(q)}" for name, q in effect.parameters.items()
+    )
+    return f"{format_effect(effect)} ({values})" if values else format_effect(effect)
+
+
+def format_fitted_quantity(fitted: Quantity) -> str:
+    """Return a value with its standard deviation and unit, by `format_quantity`."""
+    return format_quantity(fitted)
+
+
+def format_two_digits(value: float) -> str:
+    """Return a number with two significant digits: `100`, not `1e+02`.
+
+    Below 1e-4 and from 1e6 on it has an exponent.
+    """
+    return f"{float(f'{value:.2g}'):g}"
+
+
+def format_improvement(report: DiagnosisReport) -> str:
+    """Return the misfits of free simulation and the confirmation in one line; "" without a misfit.
+
+    It is "misfit of free simulation, train: w 12 % to 5 %; held out: ... - confirmed"; equal
+    misfits are given once, and the end is "", " - confirmed" or " - not confirmed".
+    """
+    fit = report.verdict.fit
+    parts = [
+        f"{name.replace('_', ' ')}: {_format_misfits(signals)}"
+        for name, signals in fit.items()
+        if signals
+    ]
+    if not parts:
+        return ""
+    confirmed = {True: " - confirmed", False: " - not confirmed", None: ""}
+    return f"misfit of free simulation, {'; '.join(parts)}{confirmed[report.verdict.confirmed]}"
+
+
+def _format_misfits(signals: Mapping[str, Misfit]) -> str:
+    """Return the misfit of each signal before and after, in per cent."""
+    found = []
+    for name, one in signals.items():
+        before, after = f"{100 * one.nrmse_before:.3g} %", f"{100 * one.nrmse_after:.3g} %"
+        found.append(f"{name} {before}" if before == after else f"{name} {before} to {after}")
+    return ", ".join(found)
+
+
+def format_missing_location(report: DiagnosisReport) -> str:
+    """Return where physics is missing in one sentence, by `format_location`.
+
+    It is "" without a diagnosis and for the verdict `nothing_missing`.
+    """
+    found = report.diagnosis
+    if found is None or report.verdict.verdict == "nothing_missing":
+        return ""
+    return format_location(report.verdict.location, found.model_set)
+
+
+def format_separation(report: DiagnosisReport) -> list[str]:
+    """Return what would separate the accepted effects from those with which they are confused.
+
+    The first line is the experiment, if there is a plan; then `<name> from <others>: <notes>` for
+    each accepted effect and rival whose file has `confused_with` and `separated_by`. Empty without
+    a diagnosis.
+    """
+    if report.diagnosis is None:
+        return []
+    selection = report.diagnosis.selection
+    lines = [format_experiment(report)] if format_experiment(report) else []
+    for tried in (*selection.accepted, *selection.rivals):
+        effect = tried.placed_effect.effect
+        if effect.separated_by and effect.confused_with:
+            name = verdict_id(tried.placed_effect, report.automaton)
+            others = ", ".join(effect.confused_with)
+            lines.append(f"{name} from {others}: {'; '.join(effect.separated_by)}")
+    return lines
+
+
+def format_oscillation(report: DiagnosisReport) -> str:
+    """Return how long the models follow the largest step, as a sentence.
+
+    The models are the base and, if effects were accepted, the final one. The text is "" without an
+    analysed step, if nothing is missing, or if the base does not oscillate at another frequency
+    after it stops following.
+    """
+    found = report.diagnosis.oscillations if report.diagnosis else ()
+    if not found or not found[0].has_other_frequency or report.verdict.verdict == "nothing_missing":
+        return ""
+    text = found[0].format_sentence()
+    if len(found) > 1:
+        after = found[1]
+        end = (
+            "to the end"
+            if after.followed_time >= after.length
+            else f"until t = {after.followed_time:.2f} s"
+        )
+        text += f"; with what was found it fits {end}"
+    return text
+
+
+def format_experiment(report: DiagnosisReport) -> str:
+    """Return the experiment to record in one sentence; "" without a plan."""
+    found = report.diagnosis.plan if report.diagnosis else None
+    return found.format_sentence() if found else ""
+
+
+def format_reason(
+    candidate_fit: CandidateFit, rank: int, selection: Selection, thresholds: Thresholds
+) -> str:
+    """Return why a candidate was accepted or not; `rank` is its index in the table.
+
+    The cases in order: accepted, a rival, not fitted (and why), a gain not above its threshold in
+    training or on parts left out, nothing accepted, and less than (or for `rank` 0 not needed
+    beside) what was accepted.
+    """
+    ids = {one.placed_effect.id for one in selection.accepted}
+    if candidate_fit.placed_effect.id in ids:
+        return "accepted"
+    if candidate_fit.placed_effect.id in {one.placed_effect.id for one in selection.rivals}:
+        if not selection.accepted:
+            return "the nearest, but not what is missing"
+        if is_confusable(candidate_fit, selection.accepted[0]):
+            return f"cannot be told from the accepted one: within {CONFUSION_GAIN:g} nats of it"
+        return "may be it as well: gains nearly as much as the best"
+    known = candidate_fit.likelihood_gain
+    if known is None:
+        if candidate_fit.screening_gain < ENTRY_THRESHOLD:
+            return f"not fitted: gains less than {ENTRY_THRESHOLD:g} nats in screening"
+        best = max(
+            (t.likelihood_gain.penalised for t in selection.first_round if t.likelihood_gain),
+            default=0.0,
+        )
+        if candidate_fit.screening_gain < PRUNING_FRACTION * best:
+            part = f"{100 * PRUNING_FRACTION:g} % of another's gain"
+            return f"not fitted: gains less than {part} in screening"
+        return f"not fitted: {MAX_FITS} others gain more in screening"
+    threshold = thresholds.threshold_of(candidate_fit.placed_effect)
+    if known.penalised <= threshold:
+        return f"gains less than {threshold:.0f} nats in training"
+    if known.cross_validated <= threshold:
+        return f"gains less than {threshold:.0f} nats on parts that were left out"
+    if not selection.accepted:
+        return "ranked behind one that was not accepted"
+    return "explains less than what was accepted" if rank else "not needed beside the others"
+
+
+def candidate_title(placed_effect: PlacedEffect, report: DiagnosisReport) -> str:
+    """Return `name@section.place` of a candidate as in verdicts."""
+    return f"{verdict_id(placed_effect, report.automaton)}@{place_path(placed_effect)}"
+
+
+def summary_lines(report: DiagnosisReport) -> list[str]:
+    """Return at most four lines that sum up a report.
+
+    They are headline, location, experiment or oscillation, improvement and caveat. The third is the
+    experiment for the verdict `ambiguous`, else the oscillation; the caveat is the worst finding
+    that is no note, else the effects that are nearly as good. If there are five, the second and the
+    third one are joined by "; ". Empty lines are left out.
+    """
+    is_ambiguous = report.verdict.verdict == "ambiguous"
+    more = format_experiment(report) if is_ambiguous else format_oscillation(report)
+    place, doubt = format_missing_location(report), _format_caveat(report)
+    if place and more and doubt:
+        place, more = f"{place}; {more}", ""
+    lines = [format_headline(report), place, more, format_improvement(report), doubt]
+    return [line for line in lines if line]
+
+
+def _format_caveat(report: DiagnosisReport) -> str:
+    """Return the worst finding on recordings, or effects that are nearly as good;
+    "" without any.
+    """
+    worst = format_findings([finding for finding in report.findings if finding.severity != "note"])
+    if worst:
+        more = f" (and {len(worst) - 1} more)" if len(worst) > 1 else ""
+        return f"recordings: {worst[0][1]}{more}"
+    verdict = report.verdict
+    if verdict.verdict == "effect" and verdict.ambiguous_with:
+        return (
+            f"nearly as good: {_join_first([format_effect(one) for one in verdict.ambiguous_with])}"
+        )
+    return ""
+
+
+def _join_first(names: Sequence[str]) -> str:
+    """Return the first names, and how many more there are."""
+    more = f" and {len(names) - MAX_NAMED} more" if len(names) > MAX_NAMED else ""
+    return ", ".join(names[:MAX_NAMED]) + more

@@ -1,0 +1,168 @@
+"""Explaining: print a spec after each pass, and compare two specs."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from language.ir.printer import format_program
+from language.loading.load import automaton_of, command_line_value, lower_automaton, program_of
+from language.loading.system_reader import read_system
+from language.lowering.program_parameters import parameter_kinds
+from language.model.printer import format_model
+from language.overlays.calibration import read_calibration
+from language.overlays.expand_document import (
+    Project,
+    add_calibrations,
+    expand_document,
+    read_document,
+)
+from language.passes.constant_folding import PASSES
+from language.programs.solved_numbers_report import format_solved_numbers
+from language.text.diagnostic import Problems, SpecError
+from language.text.document import Document
+from language.text.node_edit import format_inline
+from language.text.provenance import (
+    ProvenanceEntry,
+    diff_specs,
+    format_diff,
+    format_spec,
+    provenance_entries,
+)
+from modewright.runtime.json_format import format_entry
+
+PassName = Literal["document", "model", "lowered", "parameters", "inputs", "program", "numbers"]
+Values = Mapping[str, str]
+
+
+def explain_spec(spec: str, stage: PassName, values: Values, root: Path | None = None) -> str:
+    """Return the text of a spec after the pass `stage`.
+
+    The passes are `document`, `model`, `lowered`, the keys of PASSES in their order, and `numbers`
+    (solved numbers). `values` are parameter values as texts; `document` ignores them. A calibration
+    has the same text for all passes but `document`: one line for each value. Raises SpecError.
+    """
+    project = Project(root or Path())
+    document = read_document(project.path_of(spec))
+    if stage == "document":
+        return format_spec(_expand_document(document, project).root)
+    if document.kind == "calibration":
+        return _calibration_text(document, project)
+    scalars = {name: command_line_value(text) for name, text in values.items()}
+    automaton = automaton_of(document, project, scalars)
+    if stage == "model":
+        return format_model(automaton)
+    if stage == "numbers":
+        return format_solved_numbers(program_of(automaton))
+    program = lower_automaton(automaton)
+    for name, run in PASSES.items():
+        if stage == "lowered":
+            break
+        program = run(program)
+        if stage == name:
+            break
+    return format_program(program)
+
+
+def _calibration_text(document: Document, project: Project) -> str:
+    """Return one line for each value of a calibration.
+
+    A line contains the value, `fixed` or `tunable`, the standard deviation, origin and date.
+    """
+    problems = Problems()
+    calibration = read_calibration(document, problems)
+    problems.raise_if_errors()
+    base = read_document(project.path_of(calibration.of.text, calibration.of.span))
+    base = add_calibrations(base, [document.source.name], document.name)
+    if expand_document(base, project).kind == "system":
+        instances = read_system(base, project).instances.values()
+        automata = {f"{instance.name}.": instance.automaton for instance in instances}
+    else:
+        automata = {"": automaton_of(base, project)}
+    lines = []
+    for owner, automaton in automata.items():
+        kinds = parameter_kinds(automaton)
+        for name, value in calibration.values.items():
+            own = name.removeprefix(owner)
+            parameter = automaton.parameters.get(own)
+            if parameter and ("." not in name or name.startswith(owner)):
+                texts = [kinds[own], *([f"std {value.std}"] if value.std else [])]
+                texts += [text for text in (value.origin, value.date) if text]
+                lines.append(f"{owner}{own} = {format_inline(value.value)}  # {', '.join(texts)}")
+    return "".join(f"{line}\n" for line in lines)
+
+
+def compare_specs(
+    spec: str, other: str, stage: PassName, values: Values, root: Path | None = None
+) -> str:
+    """Return the difference of two specs after a pass as text; empty if they are equal.
+
+    For `document` the differences are by key; else they are a unified diff of both results of
+    `explain_spec` with `values`. Raises SpecError.
+    """
+    if stage == "document":
+        project = Project(root or Path())
+        old, new = (_load_expanded(name, project).root for name in (spec, other))
+        return format_diff(diff_specs(old, new))
+    before, after = (explain_spec(name, stage, values, root).splitlines() for name in (spec, other))
+    found = difflib.unified_diff(before, after, spec, other, lineterm="")
+    return "".join(f"{line}\n" for line in found)
+
+
+def spec_json(spec: str, root: Path | None = None) -> dict[str, Any]:
+    """Return the values of an expanded spec with their places, as a dict for JSON.
+
+    The keys are `format`, `kind`, `name` and `values`: one value for each scalar, list and empty
+    mapping, with `path`, `value`, `place`, `layer` (the overlay that gave it) and `changes` (places
+    and overlays that replaced earlier values). Raises SpecError.
+    """
+    document = _load_expanded(spec, Project(root or Path()))
+    found = [_row_json(row) for row in provenance_entries(document.root)]
+    head = {"kind": document.kind, "name": document.name}
+    return {**format_entry("spec"), **head, "values": found}
+
+
+def spec_differences_json(spec: str, other: str, root: Path | None = None) -> dict[str, Any]:
+    """Return the differences of two expanded specs as a dict for JSON.
+
+    The keys are `format` and `differences`; each difference has `path`, `old` and `new`, which are
+    values as in `spec_json`, or None where a spec lacks the path. Raises SpecError.
+    """
+    project = Project(root or Path())
+    old, new = (_load_expanded(name, project).root for name in (spec, other))
+    found = [
+        {
+            "path": difference.path,
+            "old": _row_json(difference.old) if difference.old else None,
+            "new": _row_json(difference.new) if difference.new else None,
+        }
+        for difference in diff_specs(old, new)
+    ]
+    return {**format_entry("spec-differences"), "differences": found}
+
+
+def _load_expanded(spec: str, project: Project) -> Document:
+    """Return the expanded document of a spec. Raises SpecError."""
+    return _expand_document(read_document(project.path_of(spec)), project)
+
+
+def _expand_document(document: Document, project: Project) -> Document:
+    """Return an expanded document. Raises SpecError with all problems."""
+    problems = Problems()
+    result = expand_document(document, project, problems)
+    if problems.has_errors:
+        raise SpecError(problems.reported)
+    return result
+
+
+def _row_json(row: ProvenanceEntry) -> dict[str, Any]:
+    """Return a value with place, overlay and changes as a dict for JSON."""
+    return {
+        "path": row.path,
+        "value": row.value,
+        "place": row.origin.place,
+        "layer": row.origin.layer,
+        "changes": [{"place": o.place, "layer": o.layer} for o in row.changes],
+    }

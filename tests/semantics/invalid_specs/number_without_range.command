@@ -1,0 +1,1 @@
+generate tests/semantics/invalid_specs/kinds_of_values.repaired.yaml

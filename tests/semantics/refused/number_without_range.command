@@ -1,1 +1,0 @@
-generate tests/semantics/refused/kinds_of_values.repaired.yaml
