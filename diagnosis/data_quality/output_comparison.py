@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from engine.recordings.recording import Channel, Recording
 from engine.results.trajectory import Trajectory
 from engine.simulation.instance_programs import programs_of
@@ -24,9 +24,10 @@ from language.model.declaration import Formula, Input
 from language.model.system import RecordingMap, Scenario, Stimulus, StimulusPiece, System
 from language.text.diagnostic import Problems, SpecError
 
-Reals = NDArray[np.float64]
 INITIAL_INPUT_NAME = "recorded_start_of_{}"
 """Name of the input that gives the initial value of a state."""
+MIN_STD = 1e-12
+"""Smallest standard deviation [SI] by which an error is divided; a constant output has 0."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,16 @@ class OutputComparison:
     times: Reals
     measured: Reals
     simulated: Reals
+
+    @property
+    def rms(self) -> float:
+        """The root mean square of measured minus simulated values."""
+        return float(np.sqrt(np.mean((self.measured - self.simulated) ** 2)))
+
+    @property
+    def nrmse(self) -> float:
+        """`rms` over the standard deviation of the measured values, which is at least MIN_STD."""
+        return self.rms / max(float(np.std(self.measured)), MIN_STD)
 
 
 @dataclass(frozen=True)
