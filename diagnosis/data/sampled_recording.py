@@ -17,13 +17,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data.noise_estimate import noise_of
 from engine.recordings.recording import Channel, Recording, split_by_windows
 from language.model.automaton import Automaton
 from language.model.graph_algorithms import reachable
 from language.model.system import RecordingMap
 
-Reals = NDArray[np.float64]
 DECIMATED_PERIOD = Fraction(5, 1000)
 """Period [s] to which faster recordings are decimated."""
 

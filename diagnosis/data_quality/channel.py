@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data_quality.finding import Finding
 from engine.recordings.recording import Channel, Recording
-
-Reals = NDArray[np.float64]
 
 GAP_FACTOR = 1.5
 """A time step above this multiple of the median step has lost samples."""

@@ -16,8 +16,8 @@ from statistics import median
 import numpy as np
 
 from codegen.toolchain.compiler import BuildError
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import (
-    Reals,
     SampledRecording,
     compared_outputs,
     require_equal_periods,

@@ -12,13 +12,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data_quality.output_comparison import OutputComparison
 from diagnosis.data_quality.reference_model import ReferenceModel
 from engine.recordings.recording import Channel, Recording, crop, split_by_windows
-
-Reals = NDArray[np.float64]
 
 GRID_STEP = 0.01
 """Step [s] of the grid on which rates of change are compared."""

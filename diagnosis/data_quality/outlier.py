@@ -8,12 +8,11 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data.noise_estimate import MAD_TO_STD
 from diagnosis.data_quality.finding import Finding
 from engine.recordings.recording import Channel, Recording, split_by_windows
 from language.model.automaton import Automaton
-
-Reals = NDArray[np.float64]
 
 MAX_VALUE = 1e15
 """A larger value [SI] was not measured; its square still fits into a double."""

@@ -11,12 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
 from diagnosis.criterion.likelihood_gain import LikelihoodGain, likelihood_gain
 from diagnosis.criterion.recording_support import supported_gain
 from diagnosis.criterion.threshold import DEFAULT_THRESHOLD, Thresholds
+from diagnosis.data.array_types import Reals
 from diagnosis.data.noise_estimate import MAD_TO_STD
 from diagnosis.estimation.estimate import Estimate, evaluate, with_normal_equations
 from diagnosis.estimation.levenberg_marquardt import iterate_broyden
@@ -44,7 +44,6 @@ from diagnosis.unknown_input.dependence import input_dependence, standstill_depe
 from diagnosis.unknown_input.quiet_interval import refit_on_quiet_intervals
 from diagnosis.validation.adequacy import has_autocorrelated_residuals
 
-Reals = NDArray[np.float64]
 ENERGY_FRACTION = 0.8
 """Part of the squares of a drift that its loudest samples have."""
 MAX_ACTIVE_FRACTION = 0.22

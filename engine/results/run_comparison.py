@@ -7,13 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from engine.results.array_types import Reals
 from engine.results.sampled_run import Event, SignalArray
 from engine.results.trajectory import Trajectory
 from language.ir.root_region import CHART
-
-Reals = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.results.array_types import Reals
 from sweep.analysis.confidence_interval import Interval
 from sweep.analysis.summary import group_values
 from sweep.definition.measure import StoreColumn
@@ -25,7 +26,7 @@ from sweep.design.sensitivity_design import STRIDE, morris_points
 from sweep.evaluation.exact_moments import scale_to_squarable
 from sweep.store.manifest import Design, store_error
 from sweep.store.store import Store
-from sweep.store.table import Reals, StudyTable
+from sweep.store.table import StudyTable
 
 BOOTSTRAP_REPLICATES = 500
 """Replicates of the bootstrap: about a dozen lie beyond each end of a 95 % interval."""

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.results.array_types import Reals
 from sweep.analysis.confidence_interval import (
     Interval,
     interval_of_mean,
@@ -27,7 +28,7 @@ from sweep.analysis.confidence_interval import (
 from sweep.definition.measure import StoreColumn
 from sweep.evaluation.exact_moments import deviation_of, mean_of, quantiles_of, total_of
 from sweep.store.store import Store
-from sweep.store.table import Reals, StudyTable, to_display_unit
+from sweep.store.table import StudyTable, to_display_unit
 
 NUMBER_PATTERN = re.compile(r"(?<![\w.])-?\d+(\.\d+)?([eE][-+]?\d+)?(?![\w.]*`)")
 """A number in a message. Messages that differ in numbers only belong to one reason of failure."""

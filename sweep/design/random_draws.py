@@ -15,11 +15,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.results.array_types import Reals
 from sweep.definition.study import TIME_DECIMALS, Distribution, Study, design_group_size
 from sweep.definition.truncation import truncation_levels
 from sweep.design.sensitivity_design import morris_points, saltelli_points
-
-Reals = NDArray[np.float64]
 
 NUMBERS_PER_COUNTER = 4
 """Numbers that Philox 4x64 generates for one counter value."""
