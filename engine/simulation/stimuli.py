@@ -10,7 +10,7 @@ from fractions import Fraction
 from engine.recordings.recording import Channel, Recording, read_recording
 from language.loading.stimulus_reader import constant_pieces, linear_pieces
 from language.lowering.connection_program import piece_block
-from language.model.system import Scenario, Stimulus, StimulusPiece, System
+from language.model.system import Scenario, Stimulus, StimulusPiece
 from language.text.diagnostic import Problems, SpecError
 
 EvaluateFormula = Callable[[str, float], float]
@@ -62,12 +62,8 @@ class InputSignal:
             self._latest = max(0, bisect_right(starts, time) - 1)
         return self._latest
 
-    def piece_starts(self) -> list[Fraction]:
-        """Return the times [s] above 0 at which pieces start, in order."""
-        return [start for start in self.starts if start > 0]
 
-
-def resolve_recording(system: System, scenario: Scenario) -> Scenario:
+def resolve_recording(scenario: Scenario) -> Scenario:
     """Return a scenario in which the inputs of a recording are stimuli.
 
     Without a recording the scenario itself is returned. Time 0 is the first time at which every

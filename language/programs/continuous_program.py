@@ -144,7 +144,7 @@ def lower_continuous_automaton(
     }
     blocks["step"] = major_step_block(field, bool(histories), blocks)
     problems.raise_if_errors()
-    variables = [*_variables(automaton, field), *major_step_variables(field, waits)]
+    variables = [*_variables(automaton, field), *major_step_variables(waits)]
     variables += continuous_step_variables(field, method)
     variables += [Variable(name, "real") for name in _parabola_variables(varying_inputs)]
     variables += continuous_delay_variables(histories)

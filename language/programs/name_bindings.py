@@ -58,7 +58,7 @@ def sampled_variables(
     found += observer_variables(automaton)
     found += covariance_variables(automaton)
     found += input_change_variables(automaton)
-    found += sampled_delay_variables(automaton, delays)
+    found += sampled_delay_variables(delays)
     found += activation_variables(automaton)
     found += rollback_variables(automaton)
     found += region_variables(automaton, "tick")

@@ -35,6 +35,6 @@ def own_fingerprint() -> Mapping[str, str]:
     return fingerprint()
 
 
-def dask_setup(worker: object) -> None:
+def dask_setup(_worker: object) -> None:
     """Ignore Ctrl-C in the worker; the parent process ends it. Dask calls this at the start."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
