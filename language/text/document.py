@@ -152,8 +152,9 @@ def read_text(path: Path, display_name: str | None = None) -> tuple[Source, str]
 
 
 def lines_of(text: str) -> tuple[str, ...]:
-    r"""Return the lines of a text as YAML counts them (LINE_END), without line ends.
+    """Return the lines of a text as YAML counts them (LINE_END), without line ends.
 
-    One `\n` at the end of the text starts no further line. An empty text has no lines.
+    A line end at the end of the text starts no further line. An empty text has no lines.
     """
-    return tuple(LINE_END.split(text.removesuffix("\n"))) if text else ()
+    *lines, last = LINE_END.split(text)
+    return (*lines, last) if last else tuple(lines)
