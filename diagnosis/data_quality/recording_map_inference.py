@@ -1,10 +1,10 @@
-"""Column guess: a recording map for a file without one, from the names and units of its columns."""
+"""Guess of a map: what files without a recording map have, from names and units of columns."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -37,40 +37,53 @@ MIN_NUMBER_FRACTION = 0.2
 """Fraction of cells that must be numbers."""
 
 
-def guess_map(path: Path, databases: Sequence[str] = ()) -> RecordingMap:
-    """Return a map of the first `MAX_COLUMNS` (12) numeric columns of a file.
+def guess_map(paths: Sequence[Path], databases: Sequence[str] = ()) -> RecordingMap:
+    """Return a map of the first `MAX_COLUMNS` (12) numeric columns of all files together.
 
-    The time is the first column named like a time (`t`, `time_ms`), else the first strictly
-    increasing one. The unit is that of the file, else that of the suffix of the name
+    The columns of a file follow those of the files before it. The time is the first column of the
+    first file that is named like a time (`t`, `time_ms`), else its first strictly increasing one.
+    The unit is that of the first file with the column, else that of the suffix of the name
     (`UNIT_SUFFIXES`), else none; columns in units of force or torque are inputs, all others
-    outputs. Repeated names are left out. `databases` are the CAN databases of the command line.
-    Raises SpecError if there is no time column or no numeric column, and MissingToolError if the
-    format needs a package that is not installed.
+    outputs. Names that a file has twice are left out. `databases` are the CAN databases of the
+    command line. Raises SpecError if the first file has no time column, for a file that cannot be
+    opened, and if no file has a numeric column; MissingToolError if the format needs a package that
+    is not installed.
     """
-    place = Span(Source(display_path(path)), 1, 1)
+    place = Span(Source(display_path(paths[0])), 1, 1)
     found = tuple(ScalarNode(name, Span(Source("command line"), 1, 1)) for name in databases)
     second = parse_unit("s")
     empty = RecordingMap("guessed from the names", "", second, {}, {}, place, databases=found)
     problems = Problems()
-    file = open_recording(path, empty, problems)
+    files = [open_recording(path, empty, problems) for path in paths]
     problems.raise_if_errors()
-    time = "" if file.is_stamped else _find_time_column(file, problems)
+    time = "" if files[0].is_stamped else _find_time_column(files[0], problems)
     problems.raise_if_errors()
     ending = time.rpartition("_")[2].lower()
     unit = parse_unit(ending) if ending in ("ms", "us") else second
+    columns: dict[str, ColumnMapping] = {}
+    for path, file in zip(paths, files, strict=True):
+        span = Span(Source(display_path(path)), 1, 1)
+        for name in _numeric_columns(file, time):
+            if name not in columns and len(columns) < MAX_COLUMNS:
+                columns[name] = _guess_column(name, file.read(name).unit, span)
+    if not columns:
+        problems.error("empty", files[0].header_span, "the recording has no column of numbers")
+    problems.raise_if_errors()
+    return replace(empty, time=time, time_unit=unit, columns=columns)
+
+
+def _numeric_columns(file: RecordedFile, time: str) -> Iterator[str]:
+    """Yield the columns of numbers of a file except those of time, in the order of the file.
+
+    Names that the file has twice are left out. Of two names of one signal in a file with time
+    stamps the shorter one is kept.
+    """
     names = [
         n for n in dict.fromkeys(file.names) if n != time and not CHANNEL_TIME_NAME.fullmatch(n)
     ]
-    if file.is_stamped:  # A signal with two names keeps the shorter one.
+    if file.is_stamped:
         names = [n for n in names if n.rpartition(".")[2] == n or n.rpartition(".")[2] not in names]
-    kept = [name for name in names if list(file.names).count(name) == 1 and _is_number(file, name)]
-    columns = {
-        name: _guess_column(name, file.read(name).unit, place) for name in kept[:MAX_COLUMNS]
-    }
-    if not columns:
-        problems.error("empty", file.header_span, "the recording has no column of numbers")
-    problems.raise_if_errors()
-    return replace(empty, time=time, time_unit=unit, columns=columns)
+    yield from (n for n in names if list(file.names).count(n) == 1 and _is_number(file, n))
 
 
 def _find_time_column(file: RecordedFile, problems: Problems) -> str:

@@ -22,7 +22,7 @@ from diagnosis.data_quality.recording_check import (
 from diagnosis.data_quality.recording_map_inference import guess_map
 from diagnosis.pipeline.diagnosis_case import Case
 from engine.recordings.recording import Recording, read_recording
-from language.loading.load import automaton_of
+from language.loading.load import load_automaton
 from language.loading.recording_map_columns import check_pairing
 from language.loading.recording_map_reader import read_map
 from language.model.automaton import Automaton
@@ -71,13 +71,13 @@ def check_recordings(
     """Read recordings and check their rates, gaps, noise and excitation.
 
     With a spec units, signs and clocks are checked, too, and only the columns that it uses are
-    read. `map` defaults to the map that the spec names. Without map and spec the columns of the
-    first file are guessed by name, with DBC files `databases`. Findings, also missing columns, are
+    read. `map` defaults to the map that the spec names. Without map and spec the columns of all
+    files are guessed by name, with DBC files `databases`. Findings, also missing columns, are
     returned and not raised. Raises SpecError for unreadable files, for a spec without map and for a
     map that does not fit; MissingToolError; and ValueError if a file occurs twice.
     """
     project = Project(root or Path())
-    automaton = _load_automaton(spec, project) if spec else None
+    automaton = load_automaton(spec, project) if spec else None
     map_name = map or (
         automaton.recording_map.text if automaton and automaton.recording_map else None
     )
@@ -91,7 +91,7 @@ def check_recordings(
         mapping = read_map(read_document(project.path_of(map_name)), project)
         _check_map(automaton, mapping)
     else:
-        mapping = guess_map(Path(files[0]), databases)
+        mapping = guess_map([Path(file) for file in files], databases)
     used = used_columns(mapping, automaton)
     if len({os.path.realpath(file) for file in files}) < len(files):
         raise ValueError("a recording is named twice: each recording counts once")
@@ -185,8 +185,3 @@ def _check_map(automaton: Automaton | None, mapping: RecordingMap) -> None:
     if automaton is not None:
         check_pairing(automaton, mapping, problems)
     problems.raise_if_errors()
-
-
-def _load_automaton(spec: str, project: Project) -> Automaton:
-    """Return the automaton of a spec. Raises SpecError."""
-    return automaton_of(read_document(project.path_of(spec)), project)

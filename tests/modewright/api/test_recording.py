@@ -97,6 +97,25 @@ def test_without_a_map_columns_are_guessed_by_their_names(
     assert [one["name"] for one in found["inputs"]] == ["torque_Nm"]
 
 
+def test_without_a_map_the_columns_of_all_files_are_guessed(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    times, values = tip_in()
+    both = {"t_ms": 1e3 * times, "torque_Nm": values["torque"]}
+    table(project / "first.csv", both)
+    table(project / "second.csv", {**both, "motor_rpm": values["motor"]})
+    assert run("first.csv", "second.csv", "--json") == 1
+    found = json.loads(capsys.readouterr().out)
+    assert [(c["recording"], c["name"]) for c in found["channels"]] == [
+        ("first.csv", "torque_Nm"),
+        ("second.csv", "torque_Nm"),
+        ("second.csv", "motor_rpm"),
+    ]
+    assert [(f["recording"], f["channel"], f["kind"]) for f in found["findings"]] == [
+        ("first.csv", "motor_rpm", "no_signal")
+    ]
+
+
 def test_what_cannot_be_read_is_told_with_its_place(
     project: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
