@@ -30,9 +30,11 @@ def read_can(path: Path, mapping: RecordingMap) -> RecordedFile:
     """Read a log of CAN frames (`.blf`, `.asc`, `.log`) with the databases of the map.
 
     Names are the signals of messages that occur in the log, both as `signal` and `message.signal`;
-    values are decoded when a signal is read. Raises SpecError if a file cannot be read or
-    understood, the log is empty or too large, or the map names no database; MissingToolError
-    without python-can or cantools.
+    a `signal` of several such messages occurs once for each of them and cannot be read. Error and
+    remote frames are left out. Raises SpecError if a file cannot be read or understood, the log is
+    empty or too large, or the map names no database; MissingToolError without python-can or
+    cantools. A signal is decoded when it is read, which raises SpecError for a frame that does not
+    fit its message.
     """
     source = Source(display_path(path))
     require_size(path, source)

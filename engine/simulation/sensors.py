@@ -112,9 +112,10 @@ class SensorRun:
     def sample(self, time: Fraction, measured: float) -> None:
         """Set `value` to a sample at a time [s], with noise and then quantisation, and count it.
 
-        Without a delay it is the lagged signal `measured` [SI]. With a delay `measured` is not
-        used: the sample is the oldest captured value, or the initial one before the first delay is
-        over.
+        Without a delay it is the lagged signal `measured` [SI]; the lag is not advanced. With a
+        delay `measured` is not used: before one delay [s] it is the signal of `start`, without the
+        lag, later the oldest captured value, which is removed (IndexError if there is none). Noise
+        takes the next number of the stream; without noise no number is taken.
         """
         if not self.sensor.delay:
             reading = self.lag.evaluate(time, measured)
