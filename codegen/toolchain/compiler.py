@@ -107,19 +107,12 @@ def compiler_version(name: str | None = None) -> str:
     return f"{os.path.realpath(shutil.which(command[0]) or command[0])}: {first}"
 
 
-def compile_program(
-    sources: Sequence[Path],
-    target: Path,
-    flags: Sequence[str] = FLAGS,
-    compiler_name: str | None = None,
-) -> None:
+def compile_program(sources: Sequence[Path], target: Path, flags: Sequence[str] = FLAGS) -> None:
     """Compile sources with WARNINGS into an executable or a library, according to `flags`.
 
     Warnings are no errors. Raises MissingToolError, BuildError.
     """
-    run_compiler(
-        [*find_compiler(compiler_name), *flags, *WARNINGS, *map(str, sources), "-lm"], target
-    )
+    run_compiler([*find_compiler(), *flags, *WARNINGS, *map(str, sources), "-lm"], target)
 
 
 def run_compiler(command: Sequence[str], target: Path) -> None:

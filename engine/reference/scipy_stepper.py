@@ -28,8 +28,6 @@ DOP853 is explicit of order 8, Radau implicit of order 5 (Hairer, Norsett, Wanne
 Differential Equations I, II.5, and II, IV.8); LSODA switches between stiff and nonstiff methods
 (Petzold 1983).
 """
-SCIPY_METHODS: tuple[ScipyMethod, ...] = ("DOP853", "Radau", "LSODA")
-"""All methods of scipy that are supported."""
 StateVector = list[float]
 """States in SI, in the order of the Program."""
 Solution = Callable[[float], StateVector]

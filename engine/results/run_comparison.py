@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from engine.results.array_types import Reals
-from engine.results.sampled_run import Event, SignalArray
+from engine.results.sampled_run import SignalArray
 from engine.results.trajectory import Trajectory
 from language.ir.root_region import CHART
 
@@ -283,8 +283,8 @@ def _compare_mode_sequences(
         events_a, events_b = (
             [
                 event
-                for event in _events_within(run.events_of(instance), span)
-                if event.region == region
+                for event in run.events_of(instance)
+                if span[0] <= event.time <= span[1] and event.region == region
             ]
             for run in (a, b)
         )
@@ -298,8 +298,3 @@ def _compare_mode_sequences(
         name = instance if region == CHART else f"{instance}.{region}"
         sequences.append(ModeSequence(name, len(events_a), len(events_b), parted, time_distance))
     return sequences
-
-
-def _events_within(events: Sequence[Event], span: tuple[float, float]) -> list[Event]:
-    """Return the events within a time span [s], ends included."""
-    return [event for event in events if span[0] <= event.time <= span[1]]

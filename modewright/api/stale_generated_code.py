@@ -9,9 +9,6 @@ from language.loading.load import automaton_of, program_of
 from language.overlays.expand_document import Project, expand_document, read_document
 from modewright.api.spec_check import spec_files
 
-MATH_LIBRARY_FILES = ("ha_math.h", "ha_math.c", "ha_mathf.h", "ha_mathf.c")
-"""The files of the mathematical library among the generated files."""
-
 
 def generated_files(root: Path, out: Path) -> dict[Path, bytes]:
     """Return the bytes of each file that belongs below the folder `out`, by path.

@@ -123,7 +123,7 @@ def sensitivity_of(store: Store) -> Sensitivity:
     if not design.has_indices:
         label = f"the points of `{manifest.study}` are no design of which indices are made"
         hint = "draw them by `sampling: {saltelli: 256, seed: 1}`, or fewer by `{morris: 50}`"
-        raise store_error(store.folder, "store", label, hint)
+        raise store_error(store.folder, label, hint)
     table = StudyTable(store)
     groups = list(_design_groups(table, design))
     found = [

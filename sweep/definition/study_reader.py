@@ -114,7 +114,7 @@ class _StudyReader(Reader):
             )
             for name, system in systems.items()
         )
-        shown = PresentationReader(self.problems, system_variants, varied, checked_measures)
+        shown = PresentationReader(self.problems, varied, checked_measures)
         study = Study(
             name=document.name,
             system_variants=system_variants,
