@@ -1,4 +1,4 @@
-"""Comparison notes: which parts of a simulation were compared with C, and why others were not."""
+"""Comparison scope: which parts of a simulation were compared with C, and why others were not."""
 
 from __future__ import annotations
 

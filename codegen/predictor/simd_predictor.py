@@ -1,4 +1,4 @@
-"""SIMD recordings: a predictor that follows several recordings at once, one in each SIMD lane.
+"""SIMD predictor: a predictor that follows several recordings at once, one in each SIMD lane.
 
 An event-free step is one straight block of C in each mode configuration
 (codegen/passes/fast_path.py). The module prints this block again over vectors. Each lane has the

@@ -1,4 +1,5 @@
-"""Machines: the targets for which generated C is compiled, and how programs are run on them."""
+"""Target machine: the targets for which generated C is compiled, and how programs are run on
+them."""
 
 from __future__ import annotations
 

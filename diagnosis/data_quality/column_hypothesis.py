@@ -1,4 +1,5 @@
-"""Clock search: columns of a recording with a wrong clock or sign, found by the prediction error.
+"""Column hypothesis: columns of a recording with a wrong clock or sign, found by the prediction
+error.
 
 Each column is shifted in time or negated. If the declared model then predicts far better, the
 column has that error. Unknown loads, wrong parameters and missing physics increase the prediction

@@ -1,4 +1,4 @@
-"""Recording picture: channels, operating range, spectrum and testable effects of recordings."""
+"""Recording figure: channels, operating range, spectrum and testable effects of recordings."""
 
 from __future__ import annotations
 

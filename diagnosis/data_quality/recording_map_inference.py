@@ -1,4 +1,5 @@
-"""Guess of a map: what files without a recording map have, from names and units of columns."""
+"""Recording map inference: what files without a recording map have, from names and units of
+columns."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Acting scale: the size of the torque, force or signal at a place,
+"""Reference magnitude: the size of the torque, force or signal at a place,
 for comparison with a disturbance.
 """
 

@@ -23,7 +23,7 @@ from diagnosis.estimation.levenberg_marquardt import iterate_broyden
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.estimation.noise_level import disturbance_units
 from diagnosis.localisation.cause import balance_of
-from diagnosis.localisation.free_disturbance import (
+from diagnosis.localisation.disturbance_state_fit import (
     ALL_LEVELS,
     SMALL_LEVEL,
     free_disturbance,

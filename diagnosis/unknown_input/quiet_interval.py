@@ -17,7 +17,7 @@ from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.data.stacked_recordings import burn_in_samples
 from diagnosis.estimation.estimate import Estimate, evaluate
 from diagnosis.estimation.noise_level import INITIAL_LEVELS, disturbance_units, fit_with_noise
-from diagnosis.localisation.free_disturbance import (
+from diagnosis.localisation.disturbance_state_fit import (
     ALL_LEVELS,
     SMALL_LEVEL,
     scan_level,

@@ -38,7 +38,7 @@ from language.ir.ops import (
     subtract,
 )
 from language.ir.program import Constant, Variable
-from language.lowering.guard_slots import guard_slots
+from language.lowering.guard_variable_names import guard_slots
 from language.model.automaton import Mode
 from language.model.constant_states import constant_states, ever_varying_states
 

@@ -1,4 +1,4 @@
-"""Instances of an automaton: expansion of other automata into parallel regions of the host.
+"""Instance expansion: expansion of other automata into parallel regions of the host.
 
 The modes of the instantiated automaton become a region with the name of the instance, such as
 `main`. Its parameters, states, discrete variables and equations get names of the host:

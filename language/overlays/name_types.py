@@ -1,4 +1,4 @@
-"""Tree types: the types of the names in an automaton's tree, before it is read as a model."""
+"""Name types: the types of the names in an automaton's tree, before it is read as a model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Guard snapshot: binds names to symbolic values at one instant in one mode.
+"""Symbolic environment: binds names to symbolic values at one instant in one mode.
 
 Expressions are lowered as for a Program. The equations that an expression reads become assignments
 before it. An equation of a parallel region is selected by the mode of that region, which is a

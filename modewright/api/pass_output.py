@@ -1,4 +1,4 @@
-"""Explaining: print a spec after each pass, and compare two specs."""
+"""Pass output: print a spec after each pass, and compare two specs."""
 
 from __future__ import annotations
 

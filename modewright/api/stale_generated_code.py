@@ -1,4 +1,4 @@
-"""Generated C: compare the C below a folder with the specs of the project."""
+"""Stale generated code: compare the C below a folder with the specs of the project."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Traces: relate requirements and keys of specs to C code and tests."""
+"""Traceability: relate requirements and keys of specs to C code and tests."""
 
 from __future__ import annotations
 

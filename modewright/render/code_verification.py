@@ -1,4 +1,4 @@
-"""Code output: print proofs, fuzzing and MC/DC of generated C."""
+"""Code verification: print proofs, fuzzing and MC/DC of generated C."""
 
 from __future__ import annotations
 

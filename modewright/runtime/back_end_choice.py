@@ -1,4 +1,4 @@
-"""Compiled run: run simulations and batches in C, or in the interpreter without a compiler.
+"""Back end choice: run simulations and batches in C, or in the interpreter without a compiler.
 
 Both have the same bits. The results name the back end, with the reason for the interpreter.
 """

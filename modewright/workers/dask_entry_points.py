@@ -1,4 +1,4 @@
-"""Dask worker: functions that Dask calls by name in a worker process.
+"""Dask entry points: functions that Dask calls by name in a worker process.
 
 The module imports the packages of this installation, independent of the working folder.
 """

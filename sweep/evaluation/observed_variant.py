@@ -1,4 +1,4 @@
-"""Observation: the mode changes and the recorded signals of one run, the input of measures."""
+"""Observed variant: the mode changes and the recorded signals of one run, the input of measures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""FMU content: the files of an FMU: model description, sources, and headers of the standard."""
+"""FMU files: the files of an FMU: model description, sources, and headers of the standard."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.estimation.noise_level import disturbance_units, fit_base, recalibrate
 from diagnosis.localisation.cause import balance_of
-from diagnosis.localisation.free_disturbance import free_disturbance
+from diagnosis.localisation.disturbance_state_fit import free_disturbance
 from diagnosis.localisation.location import Location, location_of
 from diagnosis.localisation.location_text import NO_LOCATION, format_location
 from diagnosis.localisation.ranking import (

@@ -14,7 +14,7 @@ from pathlib import Path
 from tests.validation.evidence.evidence_store import ROOT
 
 WHOLE = (
-    *("first_drive", "complete", "lockstep_bits", "random_specs", "random_charts"),
+    *("first_drive", "complete", "lockstep_bit_equality", "random_specs", "random_charts"),
     *(
         "command_line",
         "editor",
@@ -28,7 +28,7 @@ WHOLE = (
         "variants",
         "tip_out",
         "diagnosis_figures/resumed_stages",
-        "target_bits",
+        "target_bit_equality",
         "diagnosis_figures/machines",
         "proofs",
         "fuzzing",
@@ -38,7 +38,7 @@ WHOLE = (
 PART = (
     "first_drive",
     "complete --part",
-    "lockstep_bits --ticks 50000",
+    "lockstep_bit_equality --ticks 50000",
     "random_specs --specs 20",
     "random_charts --charts 20",
     *("command_line", "editor", "static_checks"),
