@@ -14,37 +14,43 @@ from pathlib import Path
 from tests.validation.evidence.evidence_store import ROOT
 
 WHOLE = (
-    *("first_drive", "complete", "lockstep_bit_equality", "random_specs", "random_charts"),
+    *(
+        "reference_traces",
+        "language_and_engine",
+        "lockstep_bit_equality",
+        "random_specs",
+        "random_charts",
+    ),
     *(
         "command_line",
         "editor",
         "static_checks",
-        "charts",
+        "chart_speed",
         "studies",
-        "fast",
-        "diagnosis_figures/open_cases",
+        "performance",
+        "diagnosis_evidence/generated_cases",
     ),
     *(
-        "variants",
+        "diagnosis_variants",
         "tip_out",
-        "diagnosis_figures/resumed_stages",
+        "diagnosis_evidence/interrupted_diagnosis",
         "target_bit_equality",
-        "diagnosis_figures/machines",
+        "diagnosis_evidence/real_machines",
         "proofs",
         "fuzzing",
     ),
-    *("twins", "mcdc", "paper", "cluster"),
+    *("hand_written_c", "mcdc", "paper", "cluster"),
 )
 PART = (
-    "first_drive",
-    "complete --part",
+    "reference_traces",
+    "language_and_engine --part",
     "lockstep_bit_equality --ticks 50000",
     "random_specs --specs 20",
     "random_charts --charts 20",
     *("command_line", "editor", "static_checks"),
 )
 """What CI measures, with words of its own."""
-OF_RECORDINGS = ("first_drive", "diagnosis_figures/machines")
+OF_RECORDINGS = ("reference_traces", "diagnosis_evidence/real_machines")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
