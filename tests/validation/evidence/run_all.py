@@ -75,7 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _path_of(name: str) -> Path:
     """Return the file of a script: one of this folder, or of a folder beside it."""
     folder, _, script = name.rpartition("/")
-    return ROOT / "tests" / "validation" / (folder or "figures") / f"{script}.py"
+    return ROOT / "tests" / "validation" / (folder or "evidence") / f"{script}.py"
 
 
 if __name__ == "__main__":
