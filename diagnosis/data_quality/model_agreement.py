@@ -164,6 +164,8 @@ def compare_signals(
     `TRANSIENT_TIME` (0.8 s) are left out. The result is None if less than 1 s remains, the
     simulation is not finite, or a rate is constant.
     """
+    if len(comparison.times) < 2:
+        return None
     start, end = comparison.times[0] + TRANSIENT_TIME, comparison.times[-1]
     if end - start < 1.0 or not np.all(np.isfinite(comparison.simulated)):
         return None

@@ -107,7 +107,7 @@ def find_long_pauses(recording: Recording) -> list[Finding]:
     """
     found = []
     for piece in split_by_windows(recording):
-        least = max(float(MAX_PAUSE_FRACTION * (piece.end - piece.start)), MIN_PAUSE)
+        least = shortest_long_pause(float(piece.end - piece.start))
         stamps = [channel.seconds for channel in piece.channels.values()]
         every = np.unique(np.concatenate(stamps or [np.zeros(0)]))
         for k in np.flatnonzero(np.diff(every) >= least)[:1]:
@@ -118,6 +118,11 @@ def find_long_pauses(recording: Recording) -> list[Finding]:
             text += "a wrong time stamp, or two recordings in one file"
             found.append(Finding("leap", recording.name, "", text, "error", (start, end)))
     return found
+
+
+def shortest_long_pause(duration: float) -> float:
+    """Return the length [s] from which a pause in stamps of a duration [s] is long."""
+    return max(float(MAX_PAUSE_FRACTION) * duration, MIN_PAUSE)
 
 
 def _format_duration(seconds: float) -> str:
