@@ -97,7 +97,7 @@ def simulate_free_run(
     if end <= start:
         problems = Problems()
         label = f"recording `{recording.name}` ends before every input has a value"
-        problems.error("range", mapping.span, label)
+        problems.error("range", recording.place or mapping.span, label)
         raise SpecError(problems.reported)
     initial_values = {
         source: _value_at(channel, start)
