@@ -102,7 +102,8 @@ def replay(
     count = int((recording.end - start) // program.period) + 1
     if count > MAX_TICKS or count < 1:
         problems = Problems()
-        label = f"the recording spans {max(count, 0)} ticks of {program.period} s; 1 to {MAX_TICKS} is fine"
+        label = f"the recording spans {max(count, 0)} ticks of {program.period} s; "
+        label += f"1 to {MAX_TICKS} is fine"
         place, hint = recording.place or mapping.span, _explain_span(recording, feeds)
         problems.error("range", place, label, hint)
         raise SpecError(problems.reported)
