@@ -61,6 +61,7 @@ def check_recordings(
     automaton: Automaton | None = None,
     run_programs: RunFunction = run_interpreter,
     find_clock_errors: ClockErrorSearch = lambda recordings: None,
+    file_findings: Sequence[Finding] = (),
 ) -> RecordingCheck:
     """Return the checks of recordings; with an automaton also of units, signs and clocks.
 
@@ -68,8 +69,8 @@ def check_recordings(
     `DISQUALIFYING_KINDS` are not compared with the model; without an automaton their speeds are
     compared with each other instead. `find_clock_errors` searches wrong clocks and signs by
     prediction, or returns None if it cannot; the clock findings of the simulation are then
-    warnings. Sampled automata are not simulated. Raises SpecError if the simulation of a recording
-    fails.
+    warnings. `file_findings` are those on the files as such. Sampled automata are not simulated.
+    Raises SpecError if the simulation of a recording fails.
     """
     mismatches = {one.name: find_clock_mismatches(one) for one in recordings}
     early_findings = [
@@ -89,7 +90,7 @@ def check_recordings(
         for finding in _find_missing_signals(recordings, channels, mapping, automaton)
         if (finding.recording, finding.channel) not in outlying
     ]
-    findings += _find_insufficient_data(recordings, channels, excited)
+    findings += [*_find_insufficient_data(recordings, channels, excited), *file_findings]
     reference = None
     if automaton is not None and automaton.period is None:
         reference = cached_reference(automaton, mapping, run_programs)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from diagnosis.data.recording_names import distinguish_file_names
 from diagnosis.data_quality.column_hypothesis import find_clock_and_sign_errors
-from diagnosis.data_quality.finding import format_findings
+from diagnosis.data_quality.finding import Finding, format_findings
 from diagnosis.data_quality.recording_check import (
     RecordingCheck,
     check_recordings as run_checks,
@@ -72,9 +72,10 @@ def check_recordings(
 
     With a spec units, signs and clocks are checked, too, and only the columns that it uses are
     read. `map` defaults to the map that the spec names. Without map and spec the columns of all
-    files are guessed by name, with DBC files `databases`. Findings, also missing columns, are
-    returned and not raised. Raises SpecError for unreadable files, for a spec without map and for a
-    map that does not fit; MissingToolError; and ValueError if a file occurs twice.
+    files are guessed by name, with DBC files `databases`, and those left out are findings.
+    Findings, also missing columns, are returned and not raised. Raises SpecError for unreadable
+    files, for a spec without map and for a map that does not fit; MissingToolError; and ValueError
+    if a file occurs twice.
     """
     project = Project(root or Path())
     automaton = load_automaton(spec, project) if spec else None
@@ -90,17 +91,19 @@ def check_recordings(
     if map_name:
         mapping = read_map(read_document(project.path_of(map_name)), project)
         _check_map(automaton, mapping)
-    else:
-        mapping = guess_map([Path(file) for file in files], databases)
-    used = used_columns(mapping, automaton)
     if len({os.path.realpath(file) for file in files}) < len(files):
         raise ValueError("a recording is named twice: each recording counts once")
     names = distinguish_file_names([Path(file) for file in files])
+    file_findings: tuple[Finding, ...] = ()
+    if not map_name:
+        mapping, file_findings = guess_map(names, databases)
+    used = used_columns(mapping, automaton)
     read = [_read_available(path, name, mapping, used) for path, name in names.items()]
     recordings = tuple(recording for recording, _ in read)
     reasons = {recording.name: why for recording, why in read}
     if spec is None or automaton is None:
-        check = _add_missing_reasons(run_checks(recordings, mapping, automaton), reasons)
+        check = run_checks(recordings, mapping, automaton, file_findings=file_findings)
+        check = _add_missing_reasons(check, reasons)
         return CheckedRecordings(check, mapping, recordings)
     document = expand_document(read_document(project.path_of(spec)), project)
     mistakes = partial(find_clock_and_sign_errors, document, project, automaton, mapping)
