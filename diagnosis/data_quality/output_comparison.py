@@ -22,7 +22,7 @@ from language.loading.system_reader import single_instance_system
 from language.model.automaton import Automaton
 from language.model.declaration import Formula, Input
 from language.model.system import RecordingMap, Scenario, Stimulus, StimulusPiece, System
-from language.text.diagnostic import Problems, SpecError
+from language.text.diagnostic import Problem, SpecError
 
 INITIAL_INPUT_NAME = "recorded_start_of_{}"
 """Name of the input that gives the initial value of a state."""
@@ -95,10 +95,8 @@ def simulate_free_run(
     start = max((c.times[0] for c in input_channels), default=recording.start)
     end = max(c.times[-1] for c in (*input_channels, *outputs))
     if end <= start:
-        problems = Problems()
         label = f"recording `{recording.name}` ends before every input has a value"
-        problems.error("range", recording.place or mapping.span, label)
-        raise SpecError(problems.reported)
+        raise SpecError([Problem("range", recording.place or mapping.span, label)])
     initial_values = {
         source: _value_at(channel, start)
         for channel in outputs

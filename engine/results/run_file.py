@@ -24,7 +24,7 @@ from engine.results.pyarrow_import import import_pyarrow
 from engine.results.sampled_run import Event, SignalArray
 from engine.results.trajectory import TIME_HEADER, Trajectory, column_headers
 from language.overlays.expand_document import display_path
-from language.text.diagnostic import Problems, Source, Span, SpecError
+from language.text.diagnostic import Problem, Source, Span, SpecError
 
 FORMATS = (".csv", ".parquet")
 """Suffixes of run files."""
@@ -331,6 +331,4 @@ def _read_parquet(path: Path) -> Trajectory:
 
 def _read_error(path: Path, kind: str, label: str, help: str = "", line: int = 1) -> SpecError:
     """Return the error of a run file at a line."""
-    problems = Problems()
-    problems.error(kind, Span(Source(display_path(path)), line, 1), label, help)
-    return SpecError(problems.reported)
+    return SpecError([Problem(kind, Span(Source(display_path(path)), line, 1), label, help)])

@@ -67,6 +67,12 @@ class FirstOrderLag:
         return value - slope + (self._value - self._input + slope) * _decay(h / self._lag)
 
 
+def philox_of(seed: int, name: str) -> np.random.Philox:
+    """Return the generator of a named stream, keyed by the seed and the SHA-256 of the name."""
+    digest = hashlib.sha256(name.encode()).digest()
+    return np.random.Philox(key=np.array([seed, int.from_bytes(digest[:8], "little")], np.uint64))
+
+
 def noise_stream(seed: int, name: str) -> Iterator[float]:
     """Yield standard normal numbers of the sensor `name`, without end.
 
@@ -74,9 +80,7 @@ def noise_stream(seed: int, name: str) -> Iterator[float]:
     Parallel random numbers: as easy as 1, 2, 3, SC 2011), keyed by the seed and the first 8 bytes
     of the SHA-256 of the name.
     """
-    digest = hashlib.sha256(name.encode()).digest()
-    key = np.array([seed, int.from_bytes(digest[:8], "little")], dtype=np.uint64)
-    generator = np.random.Generator(np.random.Philox(key=key))
+    generator = np.random.Generator(philox_of(seed, name))
     while True:
         yield from generator.standard_normal(NOISE_CHUNK).tolist()
 

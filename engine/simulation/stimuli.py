@@ -11,7 +11,7 @@ from engine.recordings.recording import Channel, Recording, read_recording
 from language.loading.stimulus_reader import constant_pieces, linear_pieces
 from language.lowering.connection_program import piece_block
 from language.model.system import Scenario, Stimulus, StimulusPiece
-from language.text.diagnostic import Problems, SpecError
+from language.text.diagnostic import Problem, SpecError
 
 EvaluateFormula = Callable[[str, float], float]
 """Function that returns the value of a formula piece, by its block and the time [s]."""
@@ -80,10 +80,8 @@ def resolve_recording(scenario: Scenario) -> Scenario:
     fed = [recording.channels[s.column] for s in scenario.inputs.values() if s.column]
     start = max((channel.times[0] for channel in fed), default=Fraction(0))
     if recording.end <= start:
-        problems = Problems()
         label = "the recording ends before every input has a value"
-        problems.error("range", use.span, label)
-        raise SpecError(problems.reported)
+        raise SpecError([Problem("range", use.span, label)])
     return dataclasses.replace(
         scenario,
         horizon=recording.end - start if scenario.horizon is None else scenario.horizon,

@@ -15,7 +15,7 @@ from language.overlays.calibration import (
 )
 from language.overlays.effect_reader import read_effect_application
 from language.readers.base_reader import Reader
-from language.text.diagnostic import Problems, Source, Span, SpecError
+from language.text.diagnostic import Problem, Problems, Source, Span, SpecError
 from language.text.document import Document, Entry, MappingNode, ScalarNode, SequenceNode
 from language.text.node_edit import mapping_entries
 from language.text.overlay import apply_overlay, without_keys
@@ -295,6 +295,4 @@ def _base_name_of(document: Document) -> ScalarNode:
     node = document.root.get("extends")
     if isinstance(node, ScalarNode):
         return node
-    problems = Problems()
-    problems.error("form", document.name_span, "a variant names its base in `extends`")
-    raise SpecError(problems.reported)
+    raise SpecError([Problem("form", document.name_span, "a variant names its base in `extends`")])

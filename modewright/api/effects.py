@@ -11,7 +11,7 @@ from diagnosis.model.effect_library import EffectDescription, describe_effect, l
 from diagnosis.result.effect_naming import VERDICT_ALIASES
 from language.loading.load import automaton_of
 from language.overlays.expand_document import Project, expand_document, read_document
-from language.text.diagnostic import Problems, Source, Span, SpecError, suggest_name
+from language.text.diagnostic import Problem, Source, Span, SpecError, suggest_name
 from language.text.document import Document
 
 if TYPE_CHECKING:
@@ -77,10 +77,8 @@ def _suggest_name(name: str, known: Iterable[str]) -> str:
 
 def _raise_name_error(text: str, label: str, help: str) -> NoReturn:
     """Raise SpecError for a text of the command line."""
-    problems = Problems()
     span = Span(Source("command line", (text,)), 1, 1, max(1, len(text)))
-    problems.error("name", span, label, help)
-    raise SpecError(problems.reported)
+    raise SpecError([Problem("name", span, label, help)])
 
 
 def draw_signature(

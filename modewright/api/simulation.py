@@ -33,7 +33,7 @@ from language.overlays.expand_document import (
     apply_variant,
     read_document,
 )
-from language.text.diagnostic import Problems, SpecError
+from language.text.diagnostic import Problem, Problems, SpecError
 from language.text.document import require_kind
 from lockstep.comparison import Verdict, add_instruction_counts, compare
 from lockstep.comparison_scope import add_notes
@@ -220,10 +220,8 @@ def _load_estimator(
     document = add_calibrations(document, calibrations, "--calibration")
     automaton = automaton_of(document, project, parse_values(values))
     if not automaton.is_sampled:
-        problems = Problems()
         label = f"`{automaton.name}` is continuous: only a sampled automaton reads a recording"
-        problems.error("form", automaton.span, label, "give it a `period`")
-        raise SpecError(problems.reported)
+        raise SpecError([Problem("form", automaton.span, label, "give it a `period`")])
     return automaton, program_of(automaton)
 
 

@@ -165,6 +165,6 @@ def _check_scenario(reference: str, project: Project) -> None:
         system = read_system(project.read(project.path_of(node.text, node.span)), project)
         read_scenario(document, project, system)
         return
-    problems = Problems()
-    problems.error("missing", document.name_span, "a scenario says what system it is `of`")
-    raise SpecError(problems.reported)
+    raise SpecError(
+        [Problem("missing", document.name_span, "a scenario says what system it is `of`")]
+    )

@@ -14,7 +14,7 @@ from expectation.coverage_measurement import (
     names_of,
 )
 from expectation.mcdc import COVERED, Decision
-from language.text.diagnostic import Problems, Source, Span, SpecError
+from language.text.diagnostic import Problem, Source, Span, SpecError
 from modewright.api.spec_tests import find_tests, load_tests
 from modewright.diagram.diagram import Diagram, graph
 from modewright.diagram.diagram_elements import Arrow, ModeBox, ModePath, RegionBox, Shade
@@ -69,10 +69,10 @@ def project_coverage_diagram(reference: str, root: Path | None = None) -> Diagra
     used = [test for test, own in zip(tests, names, strict=True) if diagram.name in own]
     parts = [part for test in used for part in measure_coverage(test) if part.name == diagram.name]
     if not parts:
-        problems = Problems()
         label = f"no test of the project runs `{diagram.name}`"
-        problems.error("missing", Span(Source("spec"), 1, 1), label, "see docs/testing.md")
-        raise SpecError(problems.reported)
+        raise SpecError(
+            [Problem("missing", Span(Source("spec"), 1, 1), label, "see docs/testing.md")]
+        )
     return shade_diagram(diagram, merge_coverages(parts)[0])
 
 

@@ -15,7 +15,7 @@ from expectation.evaluate_expectations import Outcome, evaluate_test
 from expectation.expectation_reader import read_test
 from expectation.expectations import Test
 from language.overlays.expand_document import Project
-from language.text.diagnostic import Problems, Source, Span, SpecError
+from language.text.diagnostic import Problem, Problems, Source, Span, SpecError
 from language.text.project_files import HEAD_PATTERN
 from modewright.api.spec_check import spec_files
 from modewright.runtime.back_end_choice import run_in_c
@@ -85,9 +85,9 @@ def run_tests(
     named = list(references) or find_tests(root)
     if not named:
         place = Span(Source("spec"), 1, 1)
-        problems = Problems()
-        problems.error("missing", place, "there is no test below spec/", "see docs/testing.md")
-        raise SpecError(problems.reported)
+        raise SpecError(
+            [Problem("missing", place, "there is no test below spec/", "see docs/testing.md")]
+        )
     for test in load_tests(named, root):
         yield run_test(test, compiled=compiled)
 

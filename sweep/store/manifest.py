@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from language.text.diagnostic import Problems, Source, Span, SpecError
+from language.text.diagnostic import Problem, Source, Span, SpecError
 from sweep.definition.description import Description
 from sweep.definition.measure import StoreColumn, columns_of
 from sweep.definition.study import Presentation, Study, SweepVariable, design_group_size
@@ -183,9 +183,7 @@ def store_error(folder: Path, label: str, help: str = "") -> SpecError:
 
     It has one error of the kind `store`, at line 1 of the folder's path, with a label and a hint.
     """
-    problems = Problems()
-    problems.error("store", file_span(folder), label, help)
-    return SpecError(problems.reported)
+    return SpecError([Problem("store", file_span(folder), label, help)])
 
 
 def file_span(path: Path) -> Span:
