@@ -88,14 +88,14 @@ def check_recordings(
         hint = "`recording_map: <name>` in the spec, or `--map`"
         problems.error("missing", automaton.span, label, hint)
         raise SpecError(problems.reported)
-    if map_name:
-        mapping = read_map(read_document(project.path_of(map_name)), project)
+    mapping = read_map(read_document(project.path_of(map_name)), project) if map_name else None
+    if mapping is not None:
         _check_map(automaton, mapping)
     if len({os.path.realpath(file) for file in files}) < len(files):
         raise ValueError("a recording is named twice: each recording counts once")
     names = distinguish_file_names([Path(file) for file in files])
     file_findings: tuple[Finding, ...] = ()
-    if not map_name:
+    if mapping is None:
         mapping, file_findings = guess_map(names, databases)
     used = used_columns(mapping, automaton)
     read = [_read_available(path, name, mapping, used) for path, name in names.items()]
