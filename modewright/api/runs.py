@@ -56,7 +56,9 @@ def plot(
     """Return a figure of one run, or of two runs with the second one dashed in the same colours.
 
     `signals` are patterns such as `plant.*` (all signals if empty). `span` is the time window [s];
-    None is the whole run. An empty title is replaced by the labels of the runs. Raises as `read`.
+    None is the whole run. An empty title is replaced by the labels of the runs. Raises as `read`,
+    and ValueError for a run without samples or signals, for a window without samples and for a
+    pattern that matches no signal.
     """
     from engine.results.plot import draw_overview
 
@@ -64,6 +66,10 @@ def plot(
     names = [
         run_label(each, letter) for each, letter in ((run, "A"), (other, "B")) if each is not None
     ]
+    for each, name in zip(runs, names, strict=True):
+        if not len(each.times) or not each.signals:
+            what = "signals" if len(each.times) else "samples"
+            raise ValueError(f"`{name}` has no {what}: there is nothing to draw")
     shown = title or (f"A: {names[0]}; B (dashed): {names[1]}" if len(runs) > 1 else names[0])
     return draw_overview(runs, signals, span, shown)
 
@@ -84,8 +90,8 @@ def compare(
     larger of `relative` times its peak in `a` and its entry in `tolerances` (patterns of names,
     values in SI); by nothing without both. Modes may disagree for `slack` [s]. `signals` are
     patterns of the names to compare (all if empty), `span` is the time window [s]. Raises as
-    `read`, and ValueError for runs without common time or signal, for different units and for a
-    tolerance that matches no signal.
+    `read`, and ValueError for runs without common time or signal, for different units, and for a
+    tolerance that matches no signal, is negative or is not finite.
     """
     return compare_runs(
         read(a), read(b),

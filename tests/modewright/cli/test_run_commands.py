@@ -1,0 +1,60 @@
+"""Commands plot, compare and simulate: options and files that are wrong usage."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from modewright.cli.app import app
+from modewright.cli.common.exit_codes import run_with_exit_code
+
+ROWS = "t [s],p.T [N*m]\n0.0,1.0\n0.1,2.0\n"
+
+
+def run(*arguments: str) -> int:
+    return run_with_exit_code(lambda: app(arguments, standalone_mode=False))
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_with_a_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "run.csv").write_text(ROWS)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("--tolerance", "*.T=-1"),
+        ("--tolerance", "*=nan"),
+        ("--tolerance", "*=inf"),
+        ("--relative", "inf"),
+        ("--relative", "nan"),
+        ("--slack", "nan"),
+    ],
+)
+def test_a_tolerance_that_is_negative_or_not_finite_is_wrong_usage(
+    arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("compare", "run.csv", "run.csv", *arguments) == 2
+    assert "Invalid value" in capsys.readouterr().err
+    assert run("compare", "run.csv", "run.csv", "--tolerance", "*.T=0.5") == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "code", "told"),
+    [
+        (ROWS, ("--from", "5"), 2, "no sample lies in 5 s to inf s: they cover 0 s to 0.1 s"),
+        (ROWS[: ROWS.index("\n") + 1], (), 2, "`run.csv` has no samples"),
+        ("t [s]\n0.0\n0.1\n", (), 2, "`run.csv` has no signals"),
+        (f"{ROWS}0.05,1.0\n", (), 1, "run.csv:4:1: "),
+    ],
+)
+def test_a_figure_of_nothing_is_refused(
+    text: str, options: tuple[str, ...], code: int, told: str,
+    tmp_path: Path, capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    (tmp_path / "run.csv").write_text(text)
+    assert run("plot", "run.csv", *options) == code
+    assert told in capsys.readouterr().err.replace("\n", " ")
+    assert not (tmp_path / "plot.png").exists()
