@@ -42,6 +42,24 @@ def test_a_tolerance_that_is_negative_or_not_finite_is_wrong_usage(
 
 
 @pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("simulate", "a", "-s", "b", "--reference", "--compiled"), "leave out --compiled"),
+        (("simulate", "a", "-s", "b", "--reference", "--interpreted"), "leave out --interpreted"),
+        (("simulate", "a", "-s", "b", "--method", "DOP853", "--compiled"), "leave out --compiled"),
+        (("simulate", "a", "-s", "b", "--reference", "--method", "RK4"), "leave out --method RK4"),
+        (("-q", "-v", "check", "--all"), "leave out one"),
+        (("check", "--all", "--json", "--github"), "leave out one"),
+    ],
+)
+def test_an_option_that_would_have_no_effect_is_wrong_usage(
+    arguments: tuple[str, ...], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(*arguments) == 2
+    assert told in capsys.readouterr().err.replace("\n", " ")
+
+
+@pytest.mark.parametrize(
     ("text", "options", "code", "told"),
     [
         (ROWS, ("--from", "5"), 2, "no sample lies in 5 s to inf s: they cover 0 s to 0.1 s"),
