@@ -1,4 +1,4 @@
-"""Commands plot, compare and simulate: options and files that are wrong usage."""
+"""Commands: options and files that are wrong usage."""
 
 from __future__ import annotations
 
@@ -50,6 +50,10 @@ def test_a_tolerance_that_is_negative_or_not_finite_is_wrong_usage(
         (("simulate", "a", "-s", "b", "--reference", "--method", "RK4"), "leave out --method RK4"),
         (("-q", "-v", "check", "--all"), "leave out one"),
         (("check", "--all", "--json", "--github"), "leave out one"),
+        (("trace", "a", "--keys", "--strict"), "leave it out: --keys"),
+        (("trace", "a", "--keys", "--requirements", "needs.csv"), "leave it out: --keys"),
+        (("fit", "a", "--train", "run.csv", "--name", "rig_7"), "goes with --out"),
+        (("fit", "a", "--train", "run.csv", "--date", "2026-11-21"), "goes with --out"),
     ],
 )
 def test_an_option_that_would_have_no_effect_is_wrong_usage(
