@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from language.text.diagnostic import Problem, Source, Span
+from modewright.api.spec_check import check
 from modewright.render.github_annotations import annotation_lines
 from modewright.render.sarif import to_sarif
 
@@ -100,3 +101,30 @@ def test_an_annotation_has_no_sign_that_would_end_it() -> None:
 
 def test_sarif_of_a_fine_spec_has_no_results() -> None:
     assert to_sarif([])["runs"][0]["results"] == []
+
+
+HEADS = {
+    "system": "inputs: {}",
+    "scenario": "of: estimator",
+    "map": "time: t",
+    "variant": "extends: tip_out",
+    "calibration": "of: estimator",
+    "study": "about: sweep",
+    "test": "of: estimator",
+}
+
+
+@pytest.mark.parametrize("kind", HEADS)
+@pytest.mark.parametrize("name", ["../../evil", "''", "/tmp/evil", "a b", "1st", "a" * 64, "off"])
+def test_the_name_of_a_document_is_checked(kind: str, name: str, tmp_path: Path) -> None:
+    path = tmp_path / "document.yaml"
+    path.write_text(f"language: 1\n{kind}: {name}\n{HEADS[kind]}\n")
+    found = [p for p in check(str(path)) if p.kind == "name" and p.code == "MW115"]
+    assert [p.span.line for p in found] == [2]
+
+
+@pytest.mark.parametrize("name", ["class", "a" * 63])
+def test_a_name_that_is_in_no_c_may_be_a_word_of_c(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "document.yaml"
+    path.write_text(f"language: 1\ncalibration: {name}\nof: estimator\nparameters: {{}}\n")
+    assert check(str(path)) == []
