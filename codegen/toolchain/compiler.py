@@ -16,6 +16,8 @@ from language.text.diagnostic import MissingToolError
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno")
 """The flags that define the bits of results."""
+OPTIMISATION_LEVELS = ("O0", "O1", "O2", "O3", "Os")
+"""Levels that keep the bits of results, without `-`."""
 
 WARNINGS = [
     "-Wall",
@@ -88,7 +90,7 @@ def find_compiler(name: str | None = None) -> list[str]:
 
 
 def flags_at_level(level: str) -> tuple[str, ...]:
-    """Return FLAGS with another optimisation level instead of -O2, for example `O3`."""
+    """Return FLAGS with another of OPTIMISATION_LEVELS instead of -O2, for example `O3`."""
     return tuple(f"-{level}" if flag == "-O2" else flag for flag in FLAGS)
 
 

@@ -6,7 +6,6 @@ import fnmatch
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -16,6 +15,7 @@ from matplotlib.figure import Figure
 from engine.results.mode_band import PALETTE, ModeBand, draw_band, label_segments
 from engine.results.sampled_run import SampledRun, matches_any
 from language.readers.mode_reader import IMPLICIT_MODE
+from language.text.arguments import PathText, to_choice, to_path
 from language.text.diagnostic import suggest_name
 from language.text.sanitise import escape_invisible
 
@@ -68,17 +68,19 @@ class Picture:
     def data(self, form: str = "png") -> bytes:
         """Return the picture as bytes of a format of matplotlib: `png` (130 dpi), `svg`, `pdf`.
 
-        The bytes have no date. Raises ValueError for an unknown format.
+        The bytes have no date. Raises ValueError for an unknown format; it names the formats.
         """
+        to_choice(form, self.figure.canvas.get_supported_filetypes(), "form")
         buffer = io.BytesIO()
         metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form, {})
         with matplotlib.rc_context({"svg.hashsalt": "modewright"}):
             self.figure.savefig(buffer, format=form, dpi=130, metadata=metadata)
         return buffer.getvalue()
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: PathText) -> None:
         """Write the picture to a file, replacing it; its suffix gives the format, as in `data`."""
-        Path(path).write_bytes(self.data(Path(path).suffix.lower()[1:]))
+        file = to_path(path, "path")
+        file.write_bytes(self.data(file.suffix.lower()[1:]))
 
     def _repr_png_(self) -> bytes:
         """Return the picture as PNG for a notebook."""

@@ -286,8 +286,9 @@ def _compare_mode_sequences(
         events_a, events_b = (
             [
                 event
-                for event in run.events_of(instance)
-                if span[0] <= event.time <= span[1] and event.region == region
+                for event in run.events
+                if (event.instance, event.region) == (instance, region)
+                and span[0] <= event.time <= span[1]
             ]
             for run in (a, b)
         )

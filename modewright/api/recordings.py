@@ -27,7 +27,16 @@ from language.loading.recording_map_columns import check_pairing
 from language.loading.recording_map_reader import read_map
 from language.model.automaton import Automaton
 from language.model.system import RecordingMap
-from language.overlays.expand_document import Project, expand_document, read_document
+from language.overlays.expand_document import expand_document, read_document
+from language.text.arguments import (
+    PathText,
+    PathTexts,
+    optional,
+    to_project,
+    to_some_texts,
+    to_text,
+    to_texts,
+)
 from language.text.diagnostic import MissingToolError, Problems, SpecError
 from modewright.runtime.back_end_choice import simulate_resolved
 
@@ -62,11 +71,11 @@ class CheckedRecordings:
 
 
 def check_recordings(
-    files: Sequence[str | Path],
-    map: str | None = None,
-    spec: str | None = None,
-    databases: Sequence[str] = (),
-    root: Path | None = None,
+    files: PathTexts,
+    map: PathText | None = None,
+    spec: PathText | None = None,
+    databases: PathTexts = (),
+    root: PathText | None = None,
 ) -> CheckedRecordings:
     """Read recordings and check their rates, gaps, noise and excitation.
 
@@ -75,11 +84,13 @@ def check_recordings(
     files are guessed by name, with DBC files `databases`, and those left out are findings.
     Findings, also missing columns, are returned and not raised. Raises SpecError for unreadable
     files, for a spec without map and for a map that does not fit; MissingToolError; and ValueError
-    if a file occurs twice.
+    without a file and if a file occurs twice.
     """
-    project = Project(root or Path())
+    project, paths = to_project(root), [Path(file) for file in to_some_texts(files, "files")]
+    map_name, spec = optional(to_text, map, "map"), optional(to_text, spec, "spec")
+    database_files = to_texts(databases, "databases")
     automaton = load_automaton(spec, project) if spec else None
-    map_name = map or (
+    map_name = map_name or (
         automaton.recording_map.text if automaton and automaton.recording_map else None
     )
     if automaton and not map_name:
@@ -91,12 +102,12 @@ def check_recordings(
     mapping = read_map(read_document(project.path_of(map_name)), project) if map_name else None
     if mapping is not None:
         _check_map(automaton, mapping)
-    if len({os.path.realpath(file) for file in files}) < len(files):
+    if len({os.path.realpath(path) for path in paths}) < len(paths):
         raise ValueError("a recording is named twice: each recording counts once")
-    names = distinguish_file_names([Path(file) for file in files])
+    names = distinguish_file_names(paths)
     file_findings: tuple[Finding, ...] = ()
     if mapping is None:
-        mapping, file_findings = guess_map(names, databases)
+        mapping, file_findings = guess_map(names, database_files)
     used = used_columns(mapping, automaton)
     read = [_read_available(path, name, mapping, used) for path, name in names.items()]
     recordings = tuple(recording for recording, _ in read)
