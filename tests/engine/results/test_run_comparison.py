@@ -135,7 +135,7 @@ def test_a_tolerance_for_no_signal_is_refused() -> None:
 def test_a_tolerance_that_is_negative_or_not_finite_is_refused(value: float) -> None:
     for given in ({"tolerances": {"p.T": value}}, {"relative": value}, {"slack": value}):
         with pytest.raises(ValueError, match="it is finite and at least 0"):
-            compare_runs(run([0.0]), run([0.0]), **given)  # type: ignore[arg-type]
+            compare_runs(run([0.0]), run([0.0]), **given)
 
 
 def test_the_picture_shades_where_modes_disagree_and_draws_the_difference() -> None:
