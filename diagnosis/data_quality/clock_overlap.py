@@ -7,14 +7,13 @@ import itertools
 import numpy as np
 
 from diagnosis.data.array_types import Reals
+from diagnosis.data_quality.channel import MIN_SAMPLES
 from diagnosis.data_quality.finding import Finding
 from diagnosis.data_quality.outlier import shortest_long_pause
 from engine.recordings.recording import Channel, Recording
 
 MIN_SHARED_FRACTION = 0.01
 """Fraction of the longer of two spans that two clocks must share; ms as s give at most 0.001."""
-MIN_SAMPLES = 10
-"""Smallest number of samples of a compared span; an input that is held may have a single one."""
 ONE_CLOCK = ": do their clocks have one unit and one start?"
 """Question at the end of a finding."""
 

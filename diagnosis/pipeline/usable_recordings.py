@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from diagnosis.data_quality.channel import MIN_SAMPLES
 from diagnosis.data_quality.clock_overlap import find_clock_mismatches
 from diagnosis.data_quality.finding import Finding, format_findings
 from diagnosis.data_quality.recording_check import RecordingCheck
@@ -32,9 +33,6 @@ def recording_errors(check: RecordingCheck) -> list[Finding]:
     """Return the findings of severity `error`, in their order."""
     return [finding for finding in check.findings if finding.severity == "error"]
 
-
-MIN_SAMPLES = 10
-"""Smallest number of samples of a channel."""
 
 MIN_SAMPLE_PERIOD = 1e-6
 """Smallest sample period [s]; below it the unit of the time is wrong."""

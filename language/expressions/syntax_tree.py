@@ -18,23 +18,23 @@ NodeT = TypeVar("NodeT")
 
 
 class _Node:
-    """A node of a syntax tree; its hash is computed once, because it is that of the whole tree."""
+    """A node of a syntax tree. Its hash covers the tree below it and is computed once."""
 
     __slots__ = ("_hash",)
 
 
 def _hash_once(node_class: type[NodeT]) -> type[NodeT]:
-    """Return the class with a hash that each node computes at its first use and keeps."""
+    """Return the class with a hash that each node computes at its first use and stores."""
     compute_hash = node_class.__hash__
 
-    def kept_hash(self: Any) -> int:
+    def cached_hash(self: Any) -> int:
         try:
             return int(self._hash)
         except AttributeError:
             object.__setattr__(self, "_hash", compute_hash(self))
             return int(self._hash)
 
-    node_class.__hash__ = kept_hash  # type: ignore[method-assign]
+    node_class.__hash__ = cached_hash  # type: ignore[method-assign]
     return node_class
 
 
