@@ -28,6 +28,8 @@ from modewright.api.simulation import load
 from modewright.runtime.back_end_choice import run_batch, run_simulation
 from tests.language.spec_builders import ROOT
 
+pytestmark = pytest.mark.long
+
 DRIVELINES = ROOT / "tests/data/specs/drivelines"
 compile_unoptimised = partial(load_library, flags=flags_at_level("O0"))
 """Bits do not depend on the level: a compiler that need not optimise is done sooner."""
