@@ -113,7 +113,7 @@ def measure_coverage(test: Test) -> list[Coverage]:
     The scenario of the test is simulated once by the interpreter, with instrumented Programs. Modes
     include those that were active within a tick only. Expectations are not evaluated.
     """
-    scenario = resolve_recording(test.system, test.scenario)
+    scenario = resolve_recording(test.scenario)
     decisions, programs, arrays = instrument_programs(automata_of(test.system, scenario))
     steppers: list[_CoverageInterpreter] = []
 

@@ -25,7 +25,6 @@ from expectation.name_resolution import (
     suggest_mode,
 )
 from language.expressions.syntax_tree import ErrorNode
-from language.expressions.units import SECOND, are_compatible
 from language.ir.root_region import CHART
 from language.loading.mode_entry_event import ModeEntryEvent, read_event
 from language.loading.scenario_reader import SCENARIO_KEYS, read_scenario
@@ -34,7 +33,7 @@ from language.lowering.program_builder import INACTIVE
 from language.model.declaration import Formula
 from language.model.system import Scenario, System
 from language.overlays.expand_document import Project, expand_document
-from language.readers.base_reader import Reader, about_of
+from language.readers.base_reader import Reader
 from language.text.diagnostic import Problems, Span, suggest_name
 from language.text.document import Document, Entry, MappingNode, ScalarNode, YamlNode, require_kind
 from language.text.overlay import without_keys
@@ -133,7 +132,7 @@ class _TestReader(Reader):
         self.problems.raise_if_errors()
         self.conditions = ConditionReader(self.problems, self.system)
         if tree.get("every") is not None:
-            every = self._time(tree.get("every"), "every") or Fraction(1, 1000)
+            every = self.read_duration(tree.get("every"), "every") or Fraction(1, 1000)
             self.scenario = dataclasses.replace(self.scenario, every=every)
         node = tree.get("expect")
         found = [self._expectation(entry) for entry in self.named_entries(node, "expect")]
@@ -150,7 +149,7 @@ class _TestReader(Reader):
             expectations=expectations,
             span=at,
             source=document.source,
-            about=about_of(tree),
+            about=tree.text_of("about"),
             requirements=all_requirements(
                 without_keys(document.root, "expect"),
                 expand_document(self.scenario_document, self.project).root,
@@ -350,21 +349,13 @@ class _TestReader(Reader):
                 self.problems.error("form", node.span, label)
             return horizon
         problem_count = len(self.problems.reported)
-        time = self._time(node, key)
+        time = self.read_duration(node, key)
         if len(self.problems.reported) > problem_count:
             return None
         if horizon is not None and time > horizon:
             label = f"`{key}` is after the end of the run, {float(horizon):.9g} s"
             self.problems.error("range", node.span, label)
         return time
-
-    def _time(self, node: YamlNode | None, what: str) -> Fraction:
-        """Return a time [s] that is not negative; reports other quantities."""
-        assert node is not None
-        value, unit = self.read_quantity(node, what, node.span, None)
-        if value < 0 or (value and not are_compatible(unit.dimension, SECOND)):
-            self.problems.error("range", node.span, f"`{what}` is a time, like `15 ms`")
-        return value
 
     def _require_row_time(self, subject: Subject, when: TimeConstraint, own: MappingNode) -> None:
         """Report a condition of signals whose time `at` is not the time of a row."""

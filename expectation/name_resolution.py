@@ -1,4 +1,4 @@
-"""Mode names: find modes, superstates, mode signals and fault bits of a system by name."""
+"""Name resolution: find modes, superstates, mode signals and fault bits of a system by name."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from expectation.expectations import Test
-from language.text.document import Document, MappingNode, ScalarNode
+from language.text.document import Document, MappingNode
 from language.text.node_edit import mapping_entries
 from language.text.requirement import find_requirements
 
@@ -168,7 +168,7 @@ def _cited_paths(document: Document, path: str) -> list[str]:
     return [
         f"{mode}.{inner}" if inner else mode
         for mode, table in _iterate_modes(document.root, ())
-        if _text(table, "like") == template
+        if table.text_of("like") == template
     ]
 
 
@@ -200,9 +200,3 @@ def _verifications_of(test: Test, passed: Mapping[str, bool]) -> Iterator[tuple[
 def _format_location(span: object) -> str:
     """Return file and line of a span, without the column."""
     return str(span).rpartition(":")[0]
-
-
-def _text(table: MappingNode, key: str) -> str:
-    """Return the text of a key; empty if it is absent or no scalar."""
-    node = table.get(key)
-    return node.text if isinstance(node, ScalarNode) else ""

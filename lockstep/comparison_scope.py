@@ -1,4 +1,4 @@
-"""Comparison notes: which parts of a simulation were compared with C, and why others were not."""
+"""Comparison scope: which parts of a simulation were compared with C, and why others were not."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def add_notes(
     Given verdicts keep their order and come first. A continuous instance that was compared up to a
     part of the horizon gets a note with that time, unless the simulation stopped.
     """
-    scenario = resolve_recording(system, scenario)
+    scenario = resolve_recording(scenario)
     verdict_by_instance = {verdict.name: verdict for verdict in verdicts}
     for name, program in programs_of(system, scenario).items():
         if name not in verdict_by_instance:

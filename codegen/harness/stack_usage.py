@@ -43,11 +43,12 @@ class _Calls:
 
 @dataclass(frozen=True)
 class StackUsage:
-    """The stack bound of a function: `most` bytes over all call chains, as far as frames are known.
+    """The stack usage of a function over all call chains, as far as frames are known.
 
-    `beside` names functions outside of the sources (memset, software arithmetic) whose frames the
-    compiler does not report. `recurring` names recursive functions, `growing` functions with a
-    variable frame size.
+    `stack_bound` is the largest sum of frames [bytes]. `unknown_functions` are those outside of the
+    sources (memset, software arithmetic), whose frames the compiler does not report and which count
+    0. `recursive_functions` are counted twice, and of `variable_frames`, functions with a frame of
+    variable size, the known part counts.
     """
 
     stack_bound: int

@@ -81,7 +81,7 @@ class _LongestPaths:
     def _callee_instructions(self, instruction: Instruction) -> int:
         """Return the maximum number of instructions of the callee of a call.
 
-        Raises Unbounded if the callee is not known.
+        Raises UnboundedError if the callee is not known.
         """
         if instruction.target not in self.names:
             raise UnboundedError(
@@ -130,8 +130,8 @@ class _ControlFlowGraph:
         """Return the maximum number of instructions of all iterations and of the last test.
 
         If a loop is entered at several nodes (`heads`), each is tried as the begin of an iteration,
-        and the path from another head is added once. Raises Unbounded if no C loop tells the number
-        of iterations.
+        and the path from another head is added once. Raises UnboundedError if no C loop tells the
+        number of iterations.
         """
         bounds: list[int] = []
         for head in sorted(heads):

@@ -27,7 +27,6 @@ from language.ir.number_type import MAX_FINITE
 from language.ir.ops import (
     Assign,
     Binary,
-    Block,
     Branch,
     Call,
     Compare,
@@ -66,7 +65,11 @@ def merge_range_checks(program: Program, by_magnitude: bool = True) -> Program:
 
     blocks = {name: map_expressions(block, fewer) for name, block in program.blocks.items()}
     latch = blocks.get(LATCH, ())
-    branches = [op for op in latch if isinstance(op, Branch) and _is_single_assignment(op.then)]
+    branches = [
+        op
+        for op in latch
+        if isinstance(op, Branch) and len(op.then) == 1 and isinstance(op.then[0], Assign)
+    ]
     if len(branches) == len(latch) > 1:
         inside = reduce(
             _conjunction, (part for branch in branches for part in _conjuncts(branch.condition))
@@ -131,8 +134,3 @@ def _conjuncts(condition: Expr) -> Iterator[Expr]:
 def _conjunction(left: Expr, right: Expr) -> Expr:
     """Return the expression `left and right`."""
     return Binary("and", left, right)
-
-
-def _is_single_assignment(block: Block) -> bool:
-    """Tell whether a block consists of one assignment."""
-    return len(block) == 1 and isinstance(block[0], Assign)

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.predictor.predictor_arrays import Reals
 from codegen.toolchain.build_cache import get_or_build, key_of
 from codegen.toolchain.compiler import (
     compile_program,
@@ -20,7 +20,6 @@ from codegen.toolchain.compiler import (
 )
 from codegen.toolchain.templates import render
 
-Reals = NDArray[np.float64]
 MAX_SAMPLES = 5000
 """Maximum number of samples; a gain that still changes then is taken as the steady-state gain."""
 STEADY_TOLERANCE = 1e-6

@@ -23,7 +23,12 @@ from codegen.emit.c_names import c_member, c_type
 from codegen.harness.harness import tunable_constants
 from codegen.passes.dead_stores import remove_dead_stores
 from codegen.predictor.kalman_gains import MAX_SAMPLES, compute_kalman_gains
-from codegen.predictor.predictor_arrays import Prediction, StackedPrediction, StackedRecordings
+from codegen.predictor.predictor_arrays import (
+    Prediction,
+    Reals,
+    StackedPrediction,
+    StackedRecordings,
+)
 from codegen.predictor.simd_predictor import simd_recordings_context
 from codegen.toolchain.build_cache import get_or_build, key_of
 from codegen.toolchain.compiler import (
@@ -93,8 +98,6 @@ def load_predictor_library(path: Path) -> Any:
     library.modewright_squares.restype = None
     return library
 
-
-Reals = NDArray[np.float64]
 
 LIBRARY_FLAGS = (
     *flags_at_level("O1"),

@@ -1,4 +1,5 @@
-"""Predictions: the arrays that a predictor reads of recordings, and the arrays that it returns."""
+"""Predictor arrays: the arrays that a predictor reads of recordings, and the arrays that it
+returns."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""SIMD recordings: a predictor that follows several recordings at once, one in each SIMD lane.
+"""SIMD predictor: a predictor that follows several recordings at once, one in each SIMD lane.
 
 An event-free step is one straight block of C in each mode configuration
 (codegen/passes/fast_path.py). The module prints this block again over vectors. Each lane has the
@@ -145,8 +145,8 @@ def _template_context(
             emitter, [n for n in lasting if n.removeprefix(REAL_PREFIX) in recorded]
         ),
         "inputs": [
-            (flatten_name(f"input.{n}"), flatten_name(f"before.{n}"), _input_kind(emitter, n), n)
-            for n in inputs
+            (flatten_name(name), flatten_name(f"before.{n}"), emitter.kind_of(Ref(name)), n)
+            for n, name in ((n, f"input.{n}") for n in inputs)
         ],
         "states": states,
         "seen": output_members,
@@ -176,11 +176,6 @@ def _region_mode_members(program: Program) -> list[tuple[str, str, str]]:
     """Return the members that hold the modes of regions: name, kind and place in an instance."""
     held = [name for name in program.mode_variables().values() if name != MODE_VARIABLE]
     return [(unqualified_name(name), "whole", CNames(program)(name)) for name in held]
-
-
-def _input_kind(emitter: VectorEmitter, name: str) -> LaneKind:
-    """Return the kind of an input."""
-    return emitter.kind_of(Ref(f"input.{name}"))
 
 
 def _instance_members(emitter: VectorEmitter, names: list[str]) -> list[tuple[str, LaneKind, str]]:

@@ -29,13 +29,12 @@ def simulator_module_context(
     name: str,
     program: Program,
     signal_names: SignalNameMap,
-    flow: int,
 ) -> dict[str, Any]:
     """Return the context of the template of an instance's C.
 
     It extends `module_context` with what the code around the blocks needs: defaults, monitored
-    ranges, invariants, slots of the row, events. `flow` is not used: the result holds under this
-    key the index of the instance among the continuous ones, -1 for a sampled one.
+    ranges, invariants, slots of the row, events. `flow` is the index of the instance
+    among the continuous ones, -1 for a sampled one.
     """
     usage_by_block = block_usages(program, locals_of(program))
     c_names = CNames(program)

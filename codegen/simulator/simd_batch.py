@@ -1,4 +1,4 @@
-"""SIMD variants: steps of several variants at once, one in each SIMD lane.
+"""SIMD batch: steps of several variants at once, one in each SIMD lane.
 
 An event-free step of a continuous automaton is arithmetic of reals, which is the same for all
 variants in one mode. The module prints these blocks of a Program again over vectors. Each lane has

@@ -140,7 +140,7 @@ class SimulatorLibrary:
         run, addresses = self._run, (ctypes.addressof(struct), ctypes.addressof(members))
         keep_alive += [struct, members]
 
-        def run_part(first: int, end: int, keep_alive: list[Any] = keep_alive) -> None:
+        def run_part(first: int, end: int, _keep_alive: list[Any] = keep_alive) -> None:
             run(*addresses, first, end)
 
         return run_part

@@ -59,10 +59,10 @@ def emit_simulator_files(assembly: SimulationAssembly, simd_batch: bool = True) 
     signal_names = SignalNameMap(assembly, programs)
     modules = {
         name: {
-            **simulator_module_context(assembly, name, program, signal_names, flow),
+            **simulator_module_context(assembly, name, program, signal_names),
             "simd": simd_batch_of(assembly, name, program, signal_names) if simd_batch else None,
         }
-        for flow, (name, program) in enumerate(programs.items())
+        for name, program in programs.items()
     }
     context = _driver_context(assembly, programs, signal_names, modules)
     files = {

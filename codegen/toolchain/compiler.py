@@ -16,6 +16,8 @@ from language.text.diagnostic import MissingToolError
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno")
 """The flags that define the bits of results."""
+OPTIMISATION_LEVELS = ("O0", "O1", "O2", "O3", "Os")
+"""Levels that keep the bits of results, without `-`."""
 
 WARNINGS = [
     "-Wall",
@@ -88,7 +90,7 @@ def find_compiler(name: str | None = None) -> list[str]:
 
 
 def flags_at_level(level: str) -> tuple[str, ...]:
-    """Return FLAGS with another optimisation level instead of -O2, for example `O3`."""
+    """Return FLAGS with another of OPTIMISATION_LEVELS instead of -O2, for example `O3`."""
     return tuple(f"-{level}" if flag == "-O2" else flag for flag in FLAGS)
 
 
@@ -107,19 +109,12 @@ def compiler_version(name: str | None = None) -> str:
     return f"{os.path.realpath(shutil.which(command[0]) or command[0])}: {first}"
 
 
-def compile_program(
-    sources: Sequence[Path],
-    target: Path,
-    flags: Sequence[str] = FLAGS,
-    compiler_name: str | None = None,
-) -> None:
+def compile_program(sources: Sequence[Path], target: Path, flags: Sequence[str] = FLAGS) -> None:
     """Compile sources with WARNINGS into an executable or a library, according to `flags`.
 
     Warnings are no errors. Raises MissingToolError, BuildError.
     """
-    run_compiler(
-        [*find_compiler(compiler_name), *flags, *WARNINGS, *map(str, sources), "-lm"], target
-    )
+    run_compiler([*find_compiler(), *flags, *WARNINGS, *map(str, sources), "-lm"], target)
 
 
 def run_compiler(command: Sequence[str], target: Path) -> None:

@@ -1,4 +1,5 @@
-"""Machines: the targets for which generated C is compiled, and how programs are run on them."""
+"""Target machine: the targets for which generated C is compiled, and how programs are run on
+them."""
 
 from __future__ import annotations
 
@@ -58,11 +59,6 @@ def harness_file(name: str) -> Path:
     return Path(str(resources.files("codegen"))) / "targets" / name
 
 
-def _find_cross_compiler(name: str | None) -> list[str]:
-    """Return the command of the compiler for a Cortex-M4F. Raises MissingToolError."""
-    return [name or require_tool(ARM_COMPILER), *CORTEX_FLAGS]
-
-
 def run_in_qemu(target: Path, records: bytes, options: Sequence[str] = ()) -> bytes:
     """Run a program for a Cortex-M4F in QEMU on input records and return its output.
 
@@ -95,7 +91,7 @@ HOST = Machine("host", ("stdio.c",), find_compiler, lambda folder: ("-lm",), run
 CORTEX_M4F = Machine(
     "cortex-m4f",
     ("semihosting.c", "cortex_m4f.c", LINKER_SCRIPT),
-    _find_cross_compiler,
+    lambda name: [name or require_tool(ARM_COMPILER), *CORTEX_FLAGS],
     lambda folder: (*CORTEX_LINK_FLAGS, "-T", str(folder / LINKER_SCRIPT), "-lm", "-lc", "-lgcc"),
     run_in_qemu,
 )

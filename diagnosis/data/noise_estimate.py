@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Reals = NDArray[np.float64]
+from diagnosis.data.array_types import Reals
+
 WINDOW_SAMPLES = 50
 """Samples of a window."""
 NOISE_QUANTILE = 0.2

@@ -17,6 +17,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data.noise_estimate import noise_of
 from diagnosis.data.time_resolution import time_resolution
 from engine.recordings.recording import Channel, Recording, split_by_windows
@@ -24,7 +25,6 @@ from language.model.automaton import Automaton
 from language.model.graph_algorithms import reachable
 from language.model.system import RecordingMap
 
-Reals = NDArray[np.float64]
 MAX_SLIP = Fraction(1, 10)
 """Slip of the grid against the last time stamp, in periods."""
 MAX_SHARED_SLIP = Fraction(1, 4)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import welch
 
-Reals = NDArray[np.float64]
+from diagnosis.data.array_types import Reals
 
 
 def spectrum(values: Reals, rate: float, max_window: int) -> tuple[Reals, Reals]:

@@ -7,12 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen.predictor.predictor_arrays import StackedRecordings
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 
-Reals = NDArray[np.float64]
 BURN_IN = 0.5
 """Seconds at the start of a recording that are not scored, while the observer finds the states."""
 CACHE_SIZE = 24

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data_quality.finding import Finding
 from engine.recordings.recording import Channel, Recording
-
-Reals = NDArray[np.float64]
 
 GAP_FACTOR = 1.5
 """A time step above this multiple of the median step has lost samples."""
@@ -30,6 +29,7 @@ STUCK_SAMPLES, STUCK_TIME = 25, 0.2
 CLIPPED_FRACTION = 0.01
 """Fraction of samples at the largest or smallest value from which a signal may be clipped."""
 MIN_SAMPLES = 10
+"""Smallest number of samples for which a property of a channel is estimated or compared."""
 QUANTUM_TOLERANCE = 0.02
 """Largest distance, in quanta, of changes from whole multiples of the quantum (rounding)."""
 

@@ -1,4 +1,5 @@
-"""Clock search: columns of a recording with a wrong clock or sign, found by the prediction error.
+"""Column hypothesis: columns of a recording with a wrong clock or sign, found by the prediction
+error.
 
 Each column is shifted in time or negated. If the declared model then predicts far better, the
 column has that error. Unknown loads, wrong parameters and missing physics increase the prediction
@@ -16,8 +17,8 @@ from statistics import median
 import numpy as np
 
 from codegen.toolchain.compiler import BuildError
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import (
-    Reals,
     SampledRecording,
     compared_outputs,
     require_equal_periods,
@@ -148,14 +149,19 @@ def _to_finding(column: ColumnMapping, error: ColumnError) -> Finding:
 def find_column_errors(
     candidate: Candidate, series: Sequence[SampledRecording]
 ) -> list[ColumnError]:
-    """Return the error common to all recordings, or those of single recordings; the first suffices.
+    """Return one error that is common to all recordings, else at most one error of each recording.
 
-    Recordings not longer than four times `MAX_LAG` (0.48 s) are left out. An error needs `MIN_GAIN`
-    (100 nats) and `MIN_GAIN_PER_SAMPLE` (0.2) and must exceed the gains of small lags and unused
-    inputs by `HARMLESS_GAIN_FACTOR` and those of other columns by `OTHER_COLUMN_FACTOR`. It is
-    common if at least two, a third of all recordings and more than `SHARED_FRACTION` of those with
-    an error agree; its lag is their median. An error of a single recording counts only if its
-    column has the same error wherever it has one.
+    Recordings not longer than four times `MAX_LAG` (0.48 s) are left out; without any other one the
+    result is empty. The error of a recording is the hypothesis with the largest gain. It has to be
+    an error (`is_error`), to gain `MIN_GAIN` (100 nats) and `MIN_GAIN_PER_SAMPLE` (0.2) times the
+    samples, and to exceed the gains of small lags and unused inputs by `HARMLESS_GAIN_FACTOR` and
+    those of other columns by `OTHER_COLUMN_FACTOR`.
+
+    A common error meets the same conditions for the sums over all recordings in which the model
+    does not diverge. At least two recordings, a third of all and more than `SHARED_FRACTION` of
+    those with an error must have one that is similar to it; the lag is their median, and the result
+    has no other error. Otherwise an error of a recording counts only if each recording with an
+    error in the same column has a similar one.
     """
     series = [one for one in series if float(one.period) * one.count > 4.0 * MAX_LAG]
     if not series:

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data.spectrum import spectrum
 from diagnosis.data_quality.channel import ChannelCheck, check_channel
 from engine.recordings.recording import Channel, Recording, split_by_windows
@@ -70,7 +70,6 @@ NEED_DESCRIPTIONS: Mapping[str, str] = {
 }
 """Each need in words, as a manoeuvre."""
 
-Reals = NDArray[np.float64]
 
 STEP_TIME = 0.06
 """A change within this time [s] is a step."""

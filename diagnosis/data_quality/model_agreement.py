@@ -12,13 +12,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data_quality.output_comparison import OutputComparison
 from diagnosis.data_quality.reference_model import ReferenceModel
 from engine.recordings.recording import Channel, Recording, crop, split_by_windows
-
-Reals = NDArray[np.float64]
 
 GRID_STEP = 0.01
 """Step [s] of the grid on which rates of change are compared."""
@@ -166,6 +164,8 @@ def compare_signals(
     `TRANSIENT_TIME` (0.8 s) are left out. The result is None if less than 1 s remains, the
     simulation is not finite, or a rate is constant.
     """
+    if len(comparison.times) < 2:
+        return None
     start, end = comparison.times[0] + TRANSIENT_TIME, comparison.times[-1]
     if end - start < 1.0 or not np.all(np.isfinite(comparison.simulated)):
         return None

@@ -8,12 +8,11 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data.noise_estimate import MAD_TO_STD
 from diagnosis.data_quality.finding import Finding
 from engine.recordings.recording import Channel, Recording, split_by_windows
 from language.model.automaton import Automaton
-
-Reals = NDArray[np.float64]
 
 MAX_VALUE = 1e15
 """A larger value [SI] was not measured; its square still fits into a double."""
@@ -108,7 +107,7 @@ def find_long_pauses(recording: Recording) -> list[Finding]:
     """
     found = []
     for piece in split_by_windows(recording):
-        least = max(float(MAX_PAUSE_FRACTION * (piece.end - piece.start)), MIN_PAUSE)
+        least = shortest_long_pause(float(piece.end - piece.start))
         stamps = [channel.seconds for channel in piece.channels.values()]
         every = np.unique(np.concatenate(stamps or [np.zeros(0)]))
         for k in np.flatnonzero(np.diff(every) >= least)[:1]:
@@ -119,6 +118,11 @@ def find_long_pauses(recording: Recording) -> list[Finding]:
             text += "a wrong time stamp, or two recordings in one file"
             found.append(Finding("leap", recording.name, "", text, "error", (start, end)))
     return found
+
+
+def shortest_long_pause(duration: float) -> float:
+    """Return the length [s] from which a pause in stamps of a duration [s] is long."""
+    return max(float(MAX_PAUSE_FRACTION) * duration, MIN_PAUSE)
 
 
 def _format_duration(seconds: float) -> str:

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from engine.recordings.recording import Channel, Recording
 from engine.results.trajectory import Trajectory
 from engine.simulation.instance_programs import programs_of
@@ -22,11 +22,12 @@ from language.loading.system_reader import single_instance_system
 from language.model.automaton import Automaton
 from language.model.declaration import Formula, Input
 from language.model.system import RecordingMap, Scenario, Stimulus, StimulusPiece, System
-from language.text.diagnostic import Problems, SpecError
+from language.text.diagnostic import Problem, SpecError
 
-Reals = NDArray[np.float64]
 INITIAL_INPUT_NAME = "recorded_start_of_{}"
 """Name of the input that gives the initial value of a state."""
+MIN_STD = 1e-12
+"""Smallest standard deviation [SI] by which an error is divided; a constant output has 0."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,16 @@ class OutputComparison:
     times: Reals
     measured: Reals
     simulated: Reals
+
+    @property
+    def rms(self) -> float:
+        """The root mean square of measured minus simulated values."""
+        return float(np.sqrt(np.mean((self.measured - self.simulated) ** 2)))
+
+    @property
+    def nrmse(self) -> float:
+        """`rms` over the standard deviation of the measured values, which is at least MIN_STD."""
+        return self.rms / max(float(np.std(self.measured)), MIN_STD)
 
 
 @dataclass(frozen=True)
@@ -84,10 +95,8 @@ def simulate_free_run(
     start = max((c.times[0] for c in input_channels), default=recording.start)
     end = max(c.times[-1] for c in (*input_channels, *outputs))
     if end <= start:
-        problems = Problems()
         label = f"recording `{recording.name}` ends before every input has a value"
-        problems.error("range", mapping.span, label)
-        raise SpecError(problems.reported)
+        raise SpecError([Problem("range", recording.place or mapping.span, label)])
     initial_values = {
         source: _value_at(channel, start)
         for channel in outputs

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from diagnosis.data_quality.channel import ChannelCheck, channel_findings, check_channel
+from diagnosis.data_quality.clock_overlap import find_clock_mismatches
 from diagnosis.data_quality.excitation import Excitation, analyse_excitation
 from diagnosis.data_quality.finding import Finding, sort_by_severity
 from diagnosis.data_quality.model_agreement import OutputAgreement, compare_with_simulation
@@ -60,6 +61,7 @@ def check_recordings(
     automaton: Automaton | None = None,
     run_programs: RunFunction = run_interpreter,
     find_clock_errors: ClockErrorSearch = lambda recordings: None,
+    file_findings: Sequence[Finding] = (),
 ) -> RecordingCheck:
     """Return the checks of recordings; with an automaton also of units, signs and clocks.
 
@@ -67,11 +69,17 @@ def check_recordings(
     `DISQUALIFYING_KINDS` are not compared with the model; without an automaton their speeds are
     compared with each other instead. `find_clock_errors` searches wrong clocks and signs by
     prediction, or returns None if it cannot; the clock findings of the simulation are then
-    warnings. Sampled automata are not simulated. Raises SpecError if the simulation of a recording
-    fails.
+    warnings. `file_findings` are those on the files as such. Sampled automata are not simulated.
+    Raises SpecError if the simulation of a recording fails.
     """
+    mismatches = {one.name: find_clock_mismatches(one) for one in recordings}
     early_findings = [
-        f for one in recordings for f in (*find_outliers(one, automaton), *find_long_pauses(one))
+        f
+        for one in recordings
+        for f in (
+            *find_outliers(one, automaton),
+            *(mismatches[one.name] or find_long_pauses(one)),
+        )
     ]
     recordings = [drop_huge_values(recording) for recording in recordings]
     channels, findings = _check_channels(recordings, early_findings)
@@ -82,11 +90,16 @@ def check_recordings(
         for finding in _find_missing_signals(recordings, channels, mapping, automaton)
         if (finding.recording, finding.channel) not in outlying
     ]
-    findings += _find_insufficient_data(recordings, channels, excited)
+    findings += [*_find_insufficient_data(recordings, channels, excited), *file_findings]
     reference = None
     if automaton is not None and automaton.period is None:
         reference = cached_reference(automaton, mapping, run_programs)
-        findings += [f for one in recordings for f in find_millisecond_time(one, reference)]
+        findings += [
+            f
+            for one in recordings
+            if not mismatches[one.name]
+            for f in find_millisecond_time(one, reference)
+        ]
     broken = {finding.recording for finding in findings if finding.kind in DISQUALIFYING_KINDS}
     usable_recordings = [one for one in recordings if "" not in broken and one.name not in broken]
     agreements: list[OutputAgreement] = []

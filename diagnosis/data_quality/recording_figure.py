@@ -1,4 +1,4 @@
-"""Recording picture: channels, operating range, spectrum and testable effects of recordings."""
+"""Recording figure: channels, operating range, spectrum and testable effects of recordings."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
-from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data.spectrum import spectrum
 from diagnosis.data_quality.channel import ChannelCheck
 from diagnosis.data_quality.excitation import Excitation, SignalExcitation
@@ -19,8 +19,6 @@ from engine.recordings.recording import Channel, Recording
 from engine.results.mode_band import PALETTE
 from engine.results.plot import Picture
 from language.text.sanitise import escape_invisible, truncate
-
-Reals = NDArray[np.float64]
 
 MAX_CHANNELS = 6
 """Maximum number of channels drawn, for one page."""
@@ -78,7 +76,7 @@ def _draw_channels(
             channel = recording.channels.get(name)
             start = float(recording.start)
             if channel is not None:
-                _draw_signal(axis, channel, shift - start, check)
+                _draw_signal(axis, channel, shift - start)
                 for one in check.channels:
                     if (one.recording, one.name) == (recording.name, name):
                         _mark_defects(axis, one, shift - start)
@@ -125,7 +123,7 @@ def _format_facts(check: ChannelCheck) -> str:
     return escape_invisible("   ".join(parts))
 
 
-def _draw_signal(axis: Axes, channel: Channel, shift: float, check: RecordingCheck) -> None:
+def _draw_signal(axis: Axes, channel: Channel, shift: float) -> None:
     """Draw one channel in the unit of its file, shifted in time."""
     times, values = _envelope(channel.seconds + shift, channel.array)
     factor = float(channel.column.unit.factor * channel.column.scale[0])

@@ -1,19 +1,27 @@
-"""Column guess: a recording map for a file without one, from the names and units of its columns."""
+"""Recording map inference: what files without a recording map have, from names and units of
+columns."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 
+from diagnosis.data_quality.clock_overlap import (
+    ONE_CLOCK,
+    format_span,
+    is_continuous,
+    lacking_overlap,
+)
+from diagnosis.data_quality.finding import Finding, Severity
 from engine.recordings.channel_reader import file_unit
 from engine.recordings.recording import open_recording
-from engine.recordings.recording_file import RecordedFile
+from engine.recordings.recording_file import RecordedFile, Samples
 from language.expressions.units import NO_UNIT, PURE_NUMBER, Unit, are_compatible, parse_unit
 from language.model.system import ColumnMapping, RecordingMap
 from language.overlays.expand_document import display_path
@@ -35,42 +43,150 @@ MAX_COLUMNS = 12
 """Maximum number of columns of a guessed map."""
 MIN_NUMBER_FRACTION = 0.2
 """Fraction of cells that must be numbers."""
+NO_VALUE = re.compile(r"[+-]?(nan|inf|infinity)|n/?a|null|none|-", re.IGNORECASE)
+"""Texts that loggers write for a value that is missing."""
+MAX_SHOWN = 20
+"""Number of characters of a text that a finding shows."""
 
 
-def guess_map(path: Path, databases: Sequence[str] = ()) -> RecordingMap:
-    """Return a map of the first `MAX_COLUMNS` (12) numeric columns of a file.
+def guess_map(
+    names: Mapping[Path, str], databases: Sequence[str] = ()
+) -> tuple[RecordingMap, tuple[Finding, ...]]:
+    """Return a map of the first `MAX_COLUMNS` (12) numeric columns of all files together, and
+    findings on the columns left out.
 
-    The time is the first column named like a time (`t`, `time_ms`), else the first strictly
-    increasing one. The unit is that of the file, else that of the suffix of the name
+    `names` are the display names of the files for findings.
+    The columns of a file follow those of the files before it. The time is the first column of the
+    first file that is named like a time (`t`, `time_ms`), else its first strictly increasing one.
+    The unit is that of the first file with the column, else that of the suffix of the name
     (`UNIT_SUFFIXES`), else none; columns in units of force or torque are inputs, all others
-    outputs. Repeated names are left out. `databases` are the CAN databases of the command line.
-    Raises SpecError if there is no time column or no numeric column, and MissingToolError if the
-    format needs a package that is not installed.
+    outputs. Names that a file has twice are left out. `databases` are the CAN databases of the
+    command line. Raises SpecError if the first file has no time column, for a file that cannot be
+    opened, and if no file has a numeric column; MissingToolError if the format needs a package that
+    is not installed.
     """
-    place = Span(Source(display_path(path)), 1, 1)
+    paths = list(names)
+    place = Span(Source(display_path(paths[0])), 1, 1)
     found = tuple(ScalarNode(name, Span(Source("command line"), 1, 1)) for name in databases)
     second = parse_unit("s")
     empty = RecordingMap("guessed from the names", "", second, {}, {}, place, databases=found)
     problems = Problems()
-    file = open_recording(path, empty, problems)
+    files = [open_recording(path, empty, problems) for path in paths]
     problems.raise_if_errors()
-    time = "" if file.is_stamped else _find_time_column(file, problems)
+    time = "" if files[0].is_stamped else _find_time_column(files[0], problems)
     problems.raise_if_errors()
     ending = time.rpartition("_")[2].lower()
     unit = parse_unit(ending) if ending in ("ms", "us") else second
+    columns: dict[str, ColumnMapping] = {}
+    for path, file in zip(paths, files, strict=True):
+        span = Span(Source(display_path(path)), 1, 1)
+        for name in _numeric_columns(file, time):
+            if name not in columns and len(columns) < MAX_COLUMNS:
+                columns[name] = _guess_column(name, file.read(name).unit, span)
+    if not columns:
+        problems.error("empty", files[0].header_span, "the recording has no column of numbers")
+    problems.raise_if_errors()
+    mapping = replace(empty, time=time, time_unit=unit, columns=columns)
+    findings = [
+        finding
+        for path, file in zip(paths, files, strict=True)
+        for finding in _left_out_findings(file, mapping, names[path])
+    ]
+    return mapping, tuple(findings)
+
+
+def _left_out_findings(file: RecordedFile, mapping: RecordingMap, name: str) -> list[Finding]:
+    """Return a finding on each column of a file that a guessed map leaves out, and on its clocks.
+
+    A column that is there twice or has no finite value is an error (a note in a file with time
+    stamps), other texts are a warning; columns after the first `MAX_COLUMNS` and time columns of
+    single channels are notes. Such a time column that shares hardly any time with that of the map
+    is an error. The second name of a signal is not reported.
+    """
+    if not file.rows:
+        return []
+    found: list[Finding] = []
+    candidates = list(_numeric_columns(file, mapping.time))
+    aliases = set(file.names) - set(_distinct_names(file, mapping.time)) - {mapping.time}
+    for column in dict.fromkeys(file.names):
+        text = ""
+        severity: Severity = "note"
+        if list(file.names).count(column) > 1:
+            text, severity = "is in the file twice", "error"
+        elif column == mapping.time or column in mapping.columns:
+            continue
+        elif column in candidates:
+            text = f"is not among the first {MAX_COLUMNS} columns"
+        elif CHANNEL_TIME_NAME.fullmatch(column):
+            found += _clock_findings(file, column, mapping, name)
+            text = "looks like the time of other columns"
+        elif column not in aliases:
+            text, severity = _explain_no_number(file.read(column))
+        if not text:
+            continue
+        if file.is_stamped and severity == "error":
+            severity = "note"  # a database has more signals than a log
+        text = text if column else f"a column without a name {text}"
+        text += ": left out (--map says which columns are read)"
+        found.append(Finding("left_out", name, column, text, severity))
+    return found
+
+
+def _explain_no_number(samples: Samples) -> tuple[str, Severity]:
+    """Return why a column is none of numbers, and how severe that is."""
+    values = samples.values
+    bad = [k for k, value in enumerate(values) if value is not None and not math.isfinite(value)]
+    count = sum(value is not None for value in values) - len(bad)
+    texts = [samples.text(k) for k in bad]
+    word = next((text for text in texts if not NO_VALUE.fullmatch(text)), "")
+    if word:
+        return f"has text, such as '{word[:MAX_SHOWN].replace('`', '')}'", "warning"
+    if not count:
+        return f"has no number: it is {'all ' + texts[0] if texts else 'blank'}", "error"
+    return f"has numbers in {count} of its {len(values)} cells only", "warning"
+
+
+def _clock_findings(
+    file: RecordedFile, column: str, mapping: RecordingMap, name: str
+) -> list[Finding]:
+    """Return an error if a time column of channels shares hardly any time with that of the map."""
+    clocks = {}
+    for one in (mapping.time, column) if list(file.names).count(mapping.time) == 1 else ():
+        ending = one.rpartition("_")[2].lower()
+        factor = float(parse_unit(ending).factor) if ending in ("ms", "us") else 1.0
+        known = [v for v in file.read(one).values if v is not None and math.isfinite(v)]
+        clocks[one] = factor * np.array(known)
+    if len(clocks) < 2 or not all(is_continuous(stamps) for stamps in clocks.values()):
+        return []
+    first, second = clocks.values()
+    amount = lacking_overlap(first, second, is_other_clock=True)
+    if not amount:
+        return []
+    both = " and ".join(f"`{one}` ({format_span(stamps)})" for one, stamps in clocks.items())
+    text = f"the times {both} have {amount} in common{ONE_CLOCK}"
+    return [Finding("time", name, column, text, "error")]
+
+
+def _numeric_columns(file: RecordedFile, time: str) -> Iterator[str]:
+    """Yield the columns of numbers of a file except those of time, in the order of the file.
+
+    Names that the file has twice are left out.
+    """
+    names = _distinct_names(file, time)
+    yield from (n for n in names if list(file.names).count(n) == 1 and _is_number(file, n))
+
+
+def _distinct_names(file: RecordedFile, time: str) -> list[str]:
+    """Return the names of a file except those of time, each once.
+
+    Of two names of one signal in a file with time stamps the shorter one is kept.
+    """
     names = [
         n for n in dict.fromkeys(file.names) if n != time and not CHANNEL_TIME_NAME.fullmatch(n)
     ]
-    if file.is_stamped:  # A signal with two names keeps the shorter one.
+    if file.is_stamped:
         names = [n for n in names if n.rpartition(".")[2] == n or n.rpartition(".")[2] not in names]
-    kept = [name for name in names if list(file.names).count(name) == 1 and _is_number(file, name)]
-    columns = {
-        name: _guess_column(name, file.read(name).unit, place) for name in kept[:MAX_COLUMNS]
-    }
-    if not columns:
-        problems.error("empty", file.header_span, "the recording has no column of numbers")
-    problems.raise_if_errors()
-    return replace(empty, time=time, time_unit=unit, columns=columns)
+    return names
 
 
 def _find_time_column(file: RecordedFile, problems: Problems) -> str:

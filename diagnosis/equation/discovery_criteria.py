@@ -1,4 +1,5 @@
-"""Trigger: when a formula is searched beside the library effects, and when it is the verdict.
+"""Discovery criteria: when a formula is searched beside the library effects, and when it is the
+verdict.
 
 If the library lacks the true effect, the nearest one still gains a lot. The remaining gain beside
 it shows that it is not the right one.

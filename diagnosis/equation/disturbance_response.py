@@ -13,9 +13,9 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen.predictor.predictor_arrays import Prediction, StackedRecordings
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.data.stacked_recordings import burn_in_samples, stack_recordings
 from diagnosis.estimation.estimate import Estimate
@@ -27,8 +27,6 @@ from language.expressions.syntax_tree import Name
 from language.model.automaton import Automaton
 from language.readers.element_reader import outputs_as_mapping
 from language.text.document import Document, Entry, MappingNode, ScalarNode
-
-Reals = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.equation.disturbance_response import element_torques
 from diagnosis.equation.term_library import LibraryTerm
 from diagnosis.estimation.model_set import ModelSet
@@ -22,7 +22,6 @@ from language.text.diagnostic import Problems, Source, Span
 from language.text.document import Document, ScalarNode
 from language.text.project_files import parse_document
 
-Reals = NDArray[np.float64]
 RANGE_FACTOR = 10.0
 """Range of a coefficient as a multiple of its value in the regression."""
 

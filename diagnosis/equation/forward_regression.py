@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-Reals = NDArray[np.float64]
+from diagnosis.data.array_types import Reals
+
 FOLDS = 4
 """Number of parts of each recording; one is left out at a time."""
 RIDGE = 1e-6

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen.predictor.predictor_arrays import Prediction
 from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
+from diagnosis.data.array_types import Reals
 from diagnosis.equation.disturbance_response import DisturbanceResponse, build_disturbance_response
 from diagnosis.equation.forward_regression import RegressionProblem, TermColumns, build_problem
 from diagnosis.equation.term_library import LibraryTerm, Signals, generate_terms
@@ -20,7 +20,6 @@ from diagnosis.localisation.reference_magnitude import place_bindings
 from language.expressions.units import Dimension
 from language.overlays.name_types import TreeTypes, format_si_unit
 
-Reals = NDArray[np.float64]
 TEST_DISTURBANCE = 0.1
 """Size [SI] of the disturbance in a test of a term, small relative to what acts."""
 

@@ -10,9 +10,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-Reals = NDArray[np.float64]
+from diagnosis.data.array_types import Reals
+
 ORDERS = (1, 2, 3, 4, 5, 6, 8, 9, 10, 12, 16, 18, 24, 36, 48)
 """Periods per turn that are tested."""
 LAGS = (0.005, 0.02, 0.06)

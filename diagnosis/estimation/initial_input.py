@@ -11,13 +11,12 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.estimate import Estimate, predict_with_gains_of
 from diagnosis.model.parameter_vector import ParameterVector
 
-Reals = NDArray[np.float64]
 AVERAGING_TIME = 0.1
 """Time [s] at the start over which inputs are averaged."""
 HYPOTHESIS_STDS = 4.0

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from codegen.predictor.predictor import Predictor
 from codegen.predictor.predictor_arrays import Prediction, StackedPrediction, StackedRecordings
+from diagnosis.data.array_types import Reals
 from diagnosis.data.noise_estimate import MAD_TO_STD
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.data.stacked_recordings import stack_recordings
 from diagnosis.model.candidate import Candidate
 from diagnosis.model.parameter_vector import ParameterVector, values_at
 
-Reals = NDArray[np.float64]
 PROCESS_NOISE_NAME, OUTPUT_NOISE_NAME, INPUT_NOISE_NAME = (
     "level of {}",
     "noise of {}",

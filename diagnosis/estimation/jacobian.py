@@ -7,13 +7,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.estimation.innovations import Innovations, PredictionResult
 from diagnosis.model.candidate import Candidate
 from diagnosis.model.parameter_vector import ParameterVector, per_recording_mask
 
-Reals = NDArray[np.float64]
 Jacobian = Mapping[str, Reals]
 """The derivative of the stacked innovations (n, outputs) with respect to each named coordinate."""
 MAX_CHANGE = 1e100

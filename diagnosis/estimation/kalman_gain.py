@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.data.stacked_recordings import burn_in_samples
 from diagnosis.estimation.innovations import KalmanGains, NoiseLevels, PredictionResult
@@ -15,7 +16,6 @@ from diagnosis.estimation.linearisation import LinearModel
 from diagnosis.estimation.operating_point import linearise_modes
 from diagnosis.model.candidate import Candidate
 
-Reals = NDArray[np.float64]
 INITIAL_STD_FRACTION = 0.01
 """Initial standard deviation of a state, as a fraction of its range."""
 MIN_INTEGRATOR_EIGENVALUE = 0.999

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen.predictor.predictor import Predictor
+from diagnosis.data.array_types import Reals
 
-Reals = NDArray[np.float64]
 MAX_QUOTIENT = 1e12
 """A larger difference quotient makes the linearisation invalid."""
 MIN_STATE_STEP = 1e-9

@@ -133,7 +133,7 @@ class ModelSet:
             name in self.automaton.states
             and placed_effect.effect.place_patterns[0].kind == "balance"
         ):
-            return _is_force_balance(self.document, self.automaton, name)
+            return _is_force_balance(self.document, name)
         if placed_effect.effect.place_patterns[0].kind == "output":
             return name in self.output_names
         return True
@@ -147,11 +147,11 @@ def balance_disturbances(document: Document, automaton: Automaton) -> tuple[Plac
     return tuple(
         disturbance_effect("balance", name)
         for name in automaton.states
-        if _is_force_balance(document, automaton, name)
+        if _is_force_balance(document, name)
     )
 
 
-def _is_force_balance(document: Document, automaton: Automaton, name: str) -> bool:
+def _is_force_balance(document: Document, name: str) -> bool:
     """Return whether the state `name` has a flow balance in units of force or torque."""
     place = find_effect_place(document.root, disturbance_effect("balance", name).effect, name)
     flow = document.root.get("flow")

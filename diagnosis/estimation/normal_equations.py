@@ -8,12 +8,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.estimation.innovations import PredictionResult
 from diagnosis.estimation.jacobian import Jacobian
 from diagnosis.model.candidate import Candidate
 from diagnosis.model.parameter_vector import ParameterVector, bounds_of, per_recording_mask
 
-Reals = NDArray[np.float64]
 Sums = tuple[Reals, Reals]
 """J'J (n, n) and J'e (n,), summed over some blocks."""
 

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.predictor.predictor_arrays import StackedPrediction
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.innovations import PredictionResult
 from diagnosis.estimation.linearisation import LinearModel, linearise
 from diagnosis.model.candidate import Candidate
 
-Reals = NDArray[np.float64]
 Integers = NDArray[np.int64]
 ModeModels = dict[int, tuple[LinearModel, int]]
 """For each mode the linearised candidate and the median dwell time [samples]."""

@@ -1,4 +1,4 @@
-"""Parameters per recording: re-estimation of phases, grades and the like with all else fixed."""
+"""Per recording parameters: re-estimation of phases, grades and the like with all else fixed."""
 
 from __future__ import annotations
 

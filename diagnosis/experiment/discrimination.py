@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.innovations import KalmanGains, predict
@@ -23,7 +23,6 @@ from diagnosis.estimation.model_set import ModelSet
 from diagnosis.experiment.manoeuvre import Manoeuvre, manoeuvres_for
 from diagnosis.model.parameter_vector import ParameterVector, vector_of
 
-Reals = NDArray[np.float64]
 MAX_CANDIDATES = 3
 """Number of candidates that are compared pair by pair."""
 MIN_LOG_BAYES_FACTOR = 20.0

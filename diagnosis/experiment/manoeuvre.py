@@ -11,14 +11,13 @@ from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.model_set import ModelSet
 from language.expressions.units import Dimension
 from language.overlays.name_types import TreeTypes
 
-Reals = NDArray[np.float64]
 FORCE_UNITS = ("N*m", "N")
 
 

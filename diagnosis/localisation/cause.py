@@ -12,15 +12,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.localisation.correlate import order_features
 from diagnosis.localisation.location import Location
 from language.expressions.text_rewrite import names_in_text
 from language.overlays.name_types import formula_entries
 
-Reals = NDArray[np.float64]
 RIPPLE_CORRELATION = 0.6
 """Correlation with an order of an angle above which a disturbance is a ripple."""
 MASS_CORRELATION, MASS_FRACTION = 0.6, 0.45
@@ -52,7 +51,7 @@ def attribute_causes(model_set: ModelSet, location: Location) -> Iterator[str]:
     paths = [f"inputs.{name}" for name in model_set.automaton.inputs]
     if _follows_acceleration(model_set, location):
         paths = [f"elements.{name}" for name in model_set.automaton.elements]
-    elif _is_constant(model_set, location):
+    elif _is_constant(location):
         paths = [path for path in paths if _has_both_signs(model_set, path)]
     elif not _is_ripple(location):
         paths = []
@@ -112,7 +111,7 @@ def _follows_acceleration(model_set: ModelSet, location: Location) -> bool:
     return bool(np.corrcoef(rates, _stacked_disturbance(location))[0, 1] > MASS_CORRELATION)
 
 
-def _is_constant(model_set: ModelSet, location: Location) -> bool:
+def _is_constant(location: Location) -> bool:
     """Return whether a disturbance is a constant rather than the sign of the speed.
 
     A line over the speed is allowed beside it, because a fit may have changed the friction of the

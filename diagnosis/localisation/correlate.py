@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.model_set import ModelSet
 from language.text.document import MappingNode, ScalarNode
 
-Reals = NDArray[np.float64]
 MAX_CORRELATES = 3
 """Number of correlates that are reported."""
 ORDERS = (1, 2, 3, 4, 6, 8, 12, 24)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.data.stacked_recordings import burn_in_samples
 from diagnosis.estimation.estimate import Estimate
@@ -18,7 +19,6 @@ from diagnosis.localisation.reference_magnitude import acting_rms
 from diagnosis.localisation.smoother import smooth_states
 from diagnosis.model.placed_effect import DISTURBANCE_STATE, PlacedEffect
 
-Reals = NDArray[np.float64]
 SIGNIFICANT_STDS = 3.0
 """Standard deviations beyond which a disturbance is significant."""
 OSCILLATION_PERIOD = 0.2

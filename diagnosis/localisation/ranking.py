@@ -15,7 +15,7 @@ from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.localisation.cause import attribute_causes, balance_of, is_inactive
-from diagnosis.localisation.free_disturbance import free_disturbance
+from diagnosis.localisation.disturbance_state_fit import free_disturbance
 from diagnosis.localisation.location import Location, location_of, with_smoothed_disturbances
 from diagnosis.model.placed_effect import PlacedEffect, disturbance_effect
 from language.text.document import MappingNode

@@ -1,19 +1,18 @@
-"""Acting scale: the size of the torque, force or signal at a place,
+"""Reference magnitude: the size of the torque, force or signal at a place,
 for comparison with a disturbance.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data.stacked_recordings import burn_in_samples
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.model.placed_effect import disturbance_effect
 from language.overlays.effect_place import PlaceMismatch, find_effect_place
 
-Reals = NDArray[np.float64]
 DISTURBANCE_KIND_BY_SECTION = {"flow": "balance", "elements": "element", "outputs": "output"}
 """The kind of disturbance for each section of a document."""
 

@@ -12,13 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.kalman_gain import LocalModel, local_models
 
-Reals = NDArray[np.float64]
 AVERAGING_TIME = 1.0
 """Time [s] over which normalised squared innovations are averaged."""
 
@@ -74,7 +73,7 @@ def smooth_states(estimate: Estimate, series: Sequence[SampledRecording]) -> lis
     locals_ = local_models(candidate, series, estimate.values(0), noise_levels, estimate.prediction)
     if not locals_:
         raise ValueError("the model is unstable in every mode")
-    steps = _smoother_input(estimate, series, locals_)
+    steps = _smoother_input(estimate, locals_)
     start = next(iter(locals_.values())).initial_std
     after, spread, ratios = smooth_deviations(steps, start, noise_levels.outputs**2)
     result = []
@@ -90,9 +89,7 @@ def smooth_states(estimate: Estimate, series: Sequence[SampledRecording]) -> lis
     return result
 
 
-def _smoother_input(
-    estimate: Estimate, series: Sequence[SampledRecording], models: dict[int, LocalModel]
-) -> SmootherInput:
+def _smoother_input(estimate: Estimate, models: dict[int, LocalModel]) -> SmootherInput:
     """Return the innovations, corrections and linear models at each sample of all recordings."""
     runs, predictor = estimate.prediction.predictions, estimate.candidate.predictor
     shape = max(run.completed for run in runs), len(runs)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.predictor.predictor import Predictor, build_predictor, columns_of
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.model.compile_cache import CompiledModel, cache_key, load_or_compile, node_text
 from diagnosis.model.parameter import FreeParameter, free_parameters_of
@@ -30,7 +31,6 @@ from language.overlays.effect_reader import added_names
 from language.overlays.expand_document import Project
 from language.text.document import Document
 
-Reals = NDArray[np.float64]
 INITIAL_VALUE_NAME = "start_of_{}"
 """Name of the tunable parameter that replaces the initial value of a compared state."""
 

@@ -10,14 +10,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from language.model.automaton import Automaton
 from language.model.declaration import Parameter
 from language.overlays.name_types import format_si_unit
 
-Reals = NDArray[np.float64]
 PRIOR_STD = 0.15
 """Prior standard deviation of a base parameter: of its logarithm, or as a fraction of its range."""
 NEUTRAL_OFFSET = 0.02

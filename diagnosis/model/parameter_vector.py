@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.model.candidate import Candidate
-
-Reals = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,5 @@
-"""Case: the input of a diagnosis - a model, a map and recordings - and how recordings are read."""
+"""Diagnosis case: the input of a diagnosis - a model, a map and recordings - and how recordings
+are read."""
 
 from __future__ import annotations
 

@@ -7,10 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
+from diagnosis.data_quality.channel import MIN_SAMPLES
+from diagnosis.data_quality.clock_overlap import find_clock_mismatches
 from diagnosis.data_quality.finding import Finding, format_findings
 from diagnosis.data_quality.recording_check import RecordingCheck
 from diagnosis.pipeline.diagnosis_case import Case
 from engine.recordings.recording import Channel, Recording
+from language.text.diagnostic import Problems
 
 
 def usable_recordings(check: RecordingCheck, case: Case) -> tuple[Path, ...]:
@@ -30,9 +33,6 @@ def recording_errors(check: RecordingCheck) -> list[Finding]:
     """Return the findings of severity `error`, in their order."""
     return [finding for finding in check.findings if finding.severity == "error"]
 
-
-MIN_SAMPLES = 10
-"""Smallest number of samples of a channel."""
 
 MIN_SAMPLE_PERIOD = 1e-6
 """Smallest sample period [s]; below it the unit of the time is wrong."""
@@ -88,7 +88,8 @@ def select_usable(
     With `anyway` errors of the check are ignored, but not recordings that no model can follow
     (`unusable_reason`). The reasons are the formatted errors of the check, if they exclude a
     recording, then `<name>: <reason>` for each recording that no model can follow. All recordings
-    must be in `recordings` of the case.
+    must be in `recordings` of the case. Raises SpecError if `anyway` leaves no recording, for each
+    one whose clocks do not overlap.
     """
     usable_files = case.train if anyway else usable_recordings(check, case)
     reasons = (
@@ -100,7 +101,21 @@ def select_usable(
         file: text for file in usable_files if (text := unusable_reason(case.recordings[file]))
     }
     reasons += [f"{case.name_of(file)}: {text}" for file, text in rejected.items()]
-    return tuple(file for file in usable_files if file not in rejected), reasons
+    kept = tuple(file for file in usable_files if file not in rejected)
+    if anyway and not kept:
+        _refuse_clock_faults(case)
+    return kept, reasons
+
+
+def _refuse_clock_faults(case: Case) -> None:
+    """Raise SpecError, at the place of the file, for recordings whose clocks do not overlap."""
+    problems = Problems()
+    for path in case.train:
+        recording = case.recordings[path]
+        place = recording.place or case.mapping.span
+        if text := _clock_fault(recording):
+            problems.error("time", place, text, "`time` of a map gives the unit of its clock")
+    problems.raise_if_errors()
 
 
 def unusable_reason(recording: Recording) -> str:
@@ -108,7 +123,8 @@ def unusable_reason(recording: Recording) -> str:
 
     A channel is faulty with a value beyond `MAX_VALUE` (1e12, SI); a compared one also with fewer
     than `MIN_SAMPLES` (10) samples, a median period below `MIN_SAMPLE_PERIOD` (1 us), or a duration
-    above `MAX_SAMPLES` periods. The text is "`column` has ...".
+    above `MAX_SAMPLES` periods. The text is "`column` has ...". Last, two channels whose clocks do
+    not overlap are a reason (`find_clock_mismatches`).
     """
     for channel in recording.channels.values():
         reason = _range_fault(channel) or (
@@ -116,7 +132,12 @@ def unusable_reason(recording: Recording) -> str:
         )
         if reason:
             return f"`{channel.column.name}` has {reason}"
-    return ""
+    return _clock_fault(recording)
+
+
+def _clock_fault(recording: Recording) -> str:
+    """Return the first pair of channels whose clocks do not overlap, else ""."""
+    return next((finding.text for finding in find_clock_mismatches(recording)), "")
 
 
 def _range_fault(channel: Channel) -> str:

@@ -1,4 +1,4 @@
-"""Unfollowed signals: signals whose free simulation is worse than a constant."""
+"""Negative fit signals: signals whose free simulation is worse than a constant."""
 
 from __future__ import annotations
 

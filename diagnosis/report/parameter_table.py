@@ -9,7 +9,7 @@ from diagnosis.pipeline.parameter_fit import parameter_note
 from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.number_text import format_change, format_with_std
 from diagnosis.selection.forward_selection import Selection
-from language.text.document import MappingNode, ScalarNode
+from language.text.document import MappingNode
 
 MIN_BIAS, MIN_BIAS_STDS, MAX_BIASED = 0.03, 3.0, 5
 """Relative bias and standard deviations from which a parameter is biased,
@@ -42,7 +42,7 @@ def parameter_rows(report: DiagnosisReport, selection: Selection) -> list[Parame
     """
     before, after = quantities_of(selection.base), quantities_of(selection.model)
     effect_abouts = {
-        placed_effect.qualified_name(own): text_of(entry, "about")
+        placed_effect.qualified_name(own): entry.text_of("about")
         for placed_effect in (tried.placed_effect for tried in selection.accepted)
         for own, entry in _parameter_tables(placed_effect.effect.body)
     }
@@ -101,13 +101,7 @@ def about_of(report: DiagnosisReport, section: str, name: str) -> str:
     """Return the text of `about` of an entry in a section of the spec; "" if there is none."""
     table = report.case.document.root.get(section)
     entry = table.get(name) if isinstance(table, MappingNode) else None
-    return text_of(entry, "about") if isinstance(entry, MappingNode) else ""
-
-
-def text_of(table: MappingNode, key: str) -> str:
-    """Return the text of a key; "" if it is absent or not a scalar."""
-    node = table.get(key)
-    return node.text if isinstance(node, ScalarNode) else ""
+    return entry.text_of("about") if isinstance(entry, MappingNode) else ""
 
 
 def format_fixed_parameters(report: DiagnosisReport) -> list[str]:

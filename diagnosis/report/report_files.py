@@ -25,7 +25,6 @@ from diagnosis.report.parameter_table import (
     format_biased_parameters,
     format_fixed_parameters,
     parameter_rows,
-    text_of,
 )
 from diagnosis.report.reproduction import (
     SCENARIO,
@@ -135,7 +134,7 @@ def _verdict_context(
     placed_effects = [one.placed_effect for one in found.selection.accepted] if found else []
     return {
         "name": report.name,
-        "about": text_of(report.case.document.root, "about"),
+        "about": report.case.document.root.text_of("about"),
         "verdict": verdict,
         "has_model": bool(placed_effects),
         "laid": [placed_effect.id for placed_effect in placed_effects],

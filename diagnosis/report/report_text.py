@@ -1,4 +1,4 @@
-"""Sentences: a diagnosis in words, for the console and the report."""
+"""Report text: a diagnosis in words, for the console and the report."""
 
 from __future__ import annotations
 

@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.data.stacked_recordings import burn_in_samples
 
-Reals = NDArray[np.float64]
 WINDOW_TIMES = (0.3, 1.0)
 """Seconds in which an answer to a moved input is heard: at once, or as long as a limit acts."""
 SMOOTHING_TIME = 0.05

@@ -11,19 +11,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
 from diagnosis.criterion.likelihood_gain import LikelihoodGain, likelihood_gain
 from diagnosis.criterion.recording_support import supported_gain
 from diagnosis.criterion.threshold import DEFAULT_THRESHOLD, Thresholds
+from diagnosis.data.array_types import Reals
 from diagnosis.data.noise_estimate import MAD_TO_STD
 from diagnosis.estimation.estimate import Estimate, evaluate, with_normal_equations
 from diagnosis.estimation.levenberg_marquardt import iterate_broyden
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.estimation.noise_level import disturbance_units
 from diagnosis.localisation.cause import balance_of
-from diagnosis.localisation.free_disturbance import (
+from diagnosis.localisation.disturbance_state_fit import (
     ALL_LEVELS,
     SMALL_LEVEL,
     free_disturbance,
@@ -41,10 +41,9 @@ from diagnosis.model.placed_effect import PlacedEffect, find_placements, place_p
 from diagnosis.selection.candidate_search import CandidateFit, LogCallback
 from diagnosis.selection.forward_selection import MIN_GAIN_RATIO, Selection, select_effects
 from diagnosis.unknown_input.dependence import input_dependence, standstill_dependence
-from diagnosis.unknown_input.quiet_interval import refit_on_quiet_intervals
+from diagnosis.unknown_input.inactive_interval import refit_on_inactive_intervals
 from diagnosis.validation.adequacy import has_autocorrelated_residuals
 
-Reals = NDArray[np.float64]
 ENERGY_FRACTION = 0.8
 """Part of the squares of a drift that its loudest samples have."""
 MAX_ACTIVE_FRACTION = 0.22
@@ -103,14 +102,14 @@ def detect_unknown_input(
     found = _find_unknown_input(model_set, selection, locations, min_gain)
     if found is None or _supported_gain(found.likelihood_gain) < min_gain:
         return selection, tuple(locations)
-    placed_effect, quiet = (
+    placed_effect, without_drifts = (
         _unknown_input_effects(model_set)[found.location.path],
         free_disturbance(model_set, selection.base),
     )
     gained = f"accepted {placed_effect.id}: {_supported_gain(found.likelihood_gain):.0f} nats"
     beside = f", beside effects that explain {found.explained:.0f}" if found.effects else ""
-    log(f"{gained}, silent most of the time{beside}")
-    place = _refit_on_quiet_intervals(model_set, found.location, found.model)
+    log(f"{gained}, inactive most of the time{beside}")
+    place = _refit_on_inactive_intervals(model_set, found.location, found.model)
     assert place.free_model is not None
     model = with_normal_equations(place.free_model, model_set.series)
     others = (one for one in locations if one.path != place.path)
@@ -119,7 +118,7 @@ def detect_unknown_input(
     is_less = _follows_effects(model_set, found)
     selection = dataclasses.replace(
         selection,
-        base=quiet,
+        base=without_drifts,
         model=model,
         accepted=(*found.effects, hidden) if is_less else (hidden, *found.effects),
         first_round=known if is_less else (hidden, *known),
@@ -151,12 +150,11 @@ def _follows_effects(model_set: ModelSet, unknown_input: _UnknownInput) -> bool:
 def _find_unknown_input(
     model_set: ModelSet, selection: Selection, locations: Sequence[Location], min_gain: float
 ) -> _UnknownInput | None:
-    """Return what acts in windows at one of the places that gain much.
+    """Return an input that acts in intervals, at one of the places with a large gain; or None.
 
-    Alone it has to gain nearly as much as any other place does, such as the inside of a shaft.
-    One that is silent most of the time is the simpler of two that gain nearly the same. Where none
-    is, effects may be what is heard there all the time: then beside these, unless they are
-    something else themselves.
+    Alone it must gain nearly as much as any other place, such as the inside of a shaft. Of two with
+    nearly the same gain, the one that is inactive most of the time is preferred. If none is, an
+    input beside the accepted effects is tried, unless their residuals are autocorrelated.
     """
     may_join = not has_autocorrelated_residuals(model_set, selection)
     shrink = 1.0 / integrated_autocorrelation(selection.base, model_set.series)
@@ -209,17 +207,17 @@ def _without_effects(
 ) -> _UnknownInput | None:
     """Return a hidden input that explains much more than what was accepted."""
     assert location.free_model is not None, "a locus with a gain was let free"
-    quiet, model = (
+    without_input, model = (
         free_disturbance(model_set, selection.base),
         with_normal_equations(location.free_model, model_set.series),
     )
-    gained = quiet.cost - model.cost
+    gained = without_input.cost - model.cost
     if selection.accepted:
         without = _fit_small_disturbances(model_set, selection.model)
-        if quiet.cost - without.cost > MAX_EXPLAINED_FRACTION * gained:
+        if without_input.cost - without.cost > MAX_EXPLAINED_FRACTION * gained:
             return None
     return _UnknownInput(
-        location, model, (), gained, likelihood_gain(model, quiet, model_set.series)
+        location, model, (), gained, likelihood_gain(model, without_input, model_set.series)
     )
 
 
@@ -287,23 +285,23 @@ def _fit_small_disturbances(model_set: ModelSet, model: Estimate) -> Estimate:
     )
 
 
-def _refit_on_quiet_intervals(
+def _refit_on_inactive_intervals(
     model_set: ModelSet, location: Location, free_model: Estimate
 ) -> Location:
-    """Return a location with a model whose parameters are fitted on the input's quiet intervals.
+    """Return a location with a model whose parameters are fitted where the input does not act.
 
     The intervals are first those outside the largest values, then those without a significant
-    value, if that costs less. The standard deviation is at least the size in quiet intervals.
+    value, if that costs less. The standard deviation is at least the size in inactive intervals.
     """
     least = _energy_level([one.values for one in location.disturbances])
-    silent = [np.abs(one.values) < least for one in location.disturbances]
-    free_model = refit_on_quiet_intervals(
-        free_model, model_set.series, [~one for one in silent], location.disturbance_state
+    is_inactive = [np.abs(one.values) < least for one in location.disturbances]
+    free_model = refit_on_inactive_intervals(
+        free_model, model_set.series, [~one for one in is_inactive], location.disturbance_state
     )
     location = with_smoothed_disturbances(
         model_set, dataclasses.replace(location, free_model=free_model, disturbances=())
     )
-    again = refit_on_quiet_intervals(
+    again = refit_on_inactive_intervals(
         free_model,
         model_set.series,
         [one.is_significant for one in location.disturbances],
@@ -313,7 +311,7 @@ def _refit_on_quiet_intervals(
         location = with_smoothed_disturbances(
             model_set, dataclasses.replace(location, free_model=again, disturbances=())
         )
-    pairs = zip(location.disturbances, silent, strict=True)
+    pairs = zip(location.disturbances, is_inactive, strict=True)
     ratios = np.concatenate([np.abs(one.values / one.stds)[rows] for one, rows in pairs])
     scale = max(1.0, MAD_TO_STD * float(np.median(ratios)))
     wider = (DisturbanceEstimate(one.values, scale * one.stds) for one in location.disturbances)

@@ -13,13 +13,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.data.stacked_recordings import burn_in_samples
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.innovations import predict
 from diagnosis.validation.misfit import Misfit
 
-Reals = NDArray[np.float64]
 OBSERVED_TIME = 1.0
 """Time [s] with corrections by the observer."""
 FREE_TIME = 1.5

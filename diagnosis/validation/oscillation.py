@@ -11,13 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.innovations import predict
 
-Reals = NDArray[np.float64]
 OBSERVED_TIME = 0.5
 """Shortest time [s] of observation before the step."""
 MAX_TIME = 2.5

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from diagnosis.criterion.cross_validation import STEP_FRACTIONS
 from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.innovations import PredictionResult, predict
@@ -23,7 +24,6 @@ from diagnosis.selection.candidate_search import CandidateFit
 from language.expressions.units import parse_unit
 from language.text.document import MappingNode, ScalarNode
 
-Reals = NDArray[np.float64]
 Integers = NDArray[np.int64]
 VARIATION_GAIN, VARIATION_FRACTION = 20.0, 0.012
 """Gain [nats] of separate values, and its fraction of the effect's gain, above which they vary."""

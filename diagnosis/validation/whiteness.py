@@ -9,13 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
 from scipy.stats import chi2
 
+from diagnosis.data.array_types import Reals
 from diagnosis.estimation.estimate import Estimate
 
-Reals = NDArray[np.float64]
 MAX_LAG_TIME = 0.25
 """Longest lag [s]."""
 MAX_LAGS = 60

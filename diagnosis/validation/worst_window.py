@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.validation.free_simulation import FREE_TIME, OBSERVED_TIME, is_free, simulate_free
-
-Reals = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -16,10 +16,10 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.results.array_types import Reals
 from language.ir.root_region import CHART
 from language.model.system import Scenario, Stimulus, System
 
-Reals = NDArray[np.float64]
 StatisticKind = Literal["first", "final", "max", "min", "peak", "mean", "rms"]
 """Kind of a statistic of a signal."""
 NO_EVENT = -1

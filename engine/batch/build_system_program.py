@@ -1,4 +1,4 @@
-"""Simulation assembly: collects instances, wires, sensors and recorded columns for compilation."""
+"""Build system program: collects instances, wires, sensors and recorded columns for compilation."""
 
 from __future__ import annotations
 

@@ -35,17 +35,6 @@ MAX_CACHED = 4
 """Number of compiled batches in a cache; a study alternates between its scenarios."""
 
 
-def run_compiled_batch(
-    batch: Batch, build: BuildLibrary, threads: int | None = None, min_steps: int = 0
-) -> BatchResult:
-    """Return the results of all variants, by compiled C on several threads.
-
-    Groups of variants that share Programs and have fewer than `min_steps` steps in all are
-    interpreted. By default there is a thread for each processor.
-    """
-    return CompiledBatch(batch, build, min_steps).run(threads)
-
-
 class CompiledBatch:
     """Compiled batch that can run repeatedly.
 

@@ -15,12 +15,12 @@ from engine.batch.batch import (
     BatchResult,
     EventKind,
     InputTable,
-    Reals,
     SignalStatistic,
 )
 from engine.batch.parameter_binding import ParameterBinding, group_variants
 from engine.interpreter.apply_calibration import DERIVE_BLOCKS
 from engine.interpreter.interpreter import Interpreter, Stepper
+from engine.results.array_types import Reals
 from engine.results.sampled_run import Event
 from engine.results.trajectory import Trajectory
 from engine.simulation.event_schedule import TimeGrid

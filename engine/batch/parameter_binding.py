@@ -69,7 +69,7 @@ def bind_parameters(batch: Batch) -> ParameterBinding:
     `require_known_names`, and SpecError for a value that the checks refuse.
     """
     require_known_names(batch)
-    scenario = _without_initial(resolve_recording(batch.system, batch.scenario), batch)
+    scenario = _without_initial(resolve_recording(batch.scenario), batch)
     seen_bounds = value_bounds(batch)
     for ends in (
         (declared, seen_bounds)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.batch.build_system_program import assembly_of
+from engine.results.array_types import Reals
 from engine.simulation.event_schedule import Schedule, TimeGrid
 from engine.simulation.sensors import noise_stream
 from engine.simulation.signal_values import DelayLine
@@ -25,7 +26,6 @@ from language.ir.program import Program
 from language.model.system import Scenario, System
 from language.programs.system_program import InputTrajectory as Varying, SimulationAssembly
 
-Reals = NDArray[np.float64]
 Integers = NDArray[np.int64]
 MAX_TICKS = 2**52
 """Largest number of common ticks in a horizon; a double counts them exactly."""
@@ -245,7 +245,7 @@ def _two(exact: Fraction) -> tuple[float, float]:
     return high, rest.numerator / rest.denominator
 
 
-def _no_formula(block: str, time: float) -> float:
+def _no_formula(block: str, _time: float) -> float:
     raise AssertionError(f"{block} is a formula of time: not planned")
 
 

@@ -1,4 +1,4 @@
-"""Compiled group: executes the variants of a batch that share their Programs in C."""
+"""Variant group: executes the variants of a batch that share their Programs in C."""
 
 from __future__ import annotations
 

@@ -14,7 +14,11 @@ INVARIANT_BLOCK = "invariants"
 
 
 class InvariantMonitor:
-    """Monitor of the invariants of one automaton; each violation is reported once."""
+    """Monitor of the invariants of one automaton; each violation is reported once.
+
+    A violation lasts from a call of `check` that finds it until one at which the invariant holds or
+    its mode is not active.
+    """
 
     def __init__(
         self, name: str, program: Program, stepper: Stepper, log: Callable[[Event], None]
@@ -25,10 +29,12 @@ class InvariantMonitor:
         self._broken: set[str] = set()
 
     def check(self, time: Fraction) -> None:
-        """Log an event for each invariant of an active mode that ceased to hold.
+        """Log an event at a time [s] for each invariant of an active mode that does not hold.
 
-        This refers to the time since the last call. An invariant that holds again, or whose mode is
-        left, can be reported again. The equations have to be evaluated for the present instant [s].
+        An invariant that was violated at the last call, too, is not reported again. The first call
+        reports each one that does not hold, and so does the first call after the entry of a mode.
+        Runs INVARIANT_BLOCK on the stepper, whose equations have to be those of the present
+        instant; a Program without invariants is left alone.
         """
         if not self._program.invariants:
             return

@@ -45,11 +45,6 @@ def _round_to_single(function: Callable[..., Any]) -> Callable[..., Any]:
     return lambda *arguments: np.float32(function(*arguments))
 
 
-def _ignore_float_errors() -> AbstractContextManager[None]:
-    """Return a context without numpy warnings: overflow and NaN are values (rule C7)."""
-    return np.errstate(all="ignore")
-
-
 ARITHMETIC_OF_TYPE: Mapping[NumberType, Arithmetic] = {
     "float64": Arithmetic(
         float, divide, ELEMENTARY_BY_TYPE["float64"], nullcontext, lambda value: value
@@ -61,7 +56,7 @@ ARITHMETIC_OF_TYPE: Mapping[NumberType, Arithmetic] = {
             name: function if name == "whole" else _round_to_single(function)
             for name, function in ELEMENTARY_BY_TYPE["float32"].items()
         },
-        _ignore_float_errors,
+        lambda: np.errstate(all="ignore"),  # overflow and NaN are values (rule C7)
         lambda value: value.item() if isinstance(value, np.generic) else value,
     ),
 }

@@ -15,7 +15,7 @@ from engine.recordings.recording_file import (
 )
 from language.model.system import RecordingMap
 from language.overlays.expand_document import display_path
-from language.text.diagnostic import MissingToolError, Problems, Source, Span, SpecError
+from language.text.diagnostic import MissingToolError, Problem, Problems, Source, Span, SpecError
 from language.text.project_boundary import path_exists, project_root_of, require_inside_project
 
 DATABASE_SUFFIXES = (".dbc", ".arxml", ".kcd", ".sym")
@@ -30,9 +30,11 @@ def read_can(path: Path, mapping: RecordingMap) -> RecordedFile:
     """Read a log of CAN frames (`.blf`, `.asc`, `.log`) with the databases of the map.
 
     Names are the signals of messages that occur in the log, both as `signal` and `message.signal`;
-    values are decoded when a signal is read. Raises SpecError if a file cannot be read or
-    understood, the log is empty or too large, or the map names no database; MissingToolError
-    without python-can or cantools.
+    a `signal` of several such messages occurs once for each of them and cannot be read. Error and
+    remote frames are left out. Raises SpecError if a file cannot be read or understood, the log is
+    empty or too large, or the map names no database; MissingToolError without python-can or
+    cantools. A signal is decoded when it is read, which raises SpecError for a frame that does not
+    fit its message.
     """
     source = Source(display_path(path))
     require_size(path, source)
@@ -45,10 +47,8 @@ def read_can(path: Path, mapping: RecordingMap) -> RecordedFile:
             "pip install 'modewright[can]'"
         ) from None
     if not mapping.databases:
-        problems = Problems()
         label = f"map `{mapping.name}` names no DBC, which a log of CAN frames needs"
-        problems.error("missing", mapping.span, label, "`dbc: vehicle.dbc` in the map")
-        raise SpecError(problems.reported)
+        raise SpecError([Problem("missing", mapping.span, label, "`dbc: vehicle.dbc` in the map")])
     messages = _read_databases(mapping, cantools)
     frames = _read_frames(path, source, can)
     return _CanLog(source, messages, frames).to_recorded_file()
@@ -181,9 +181,7 @@ class _CanLog:
                     label += (
                         f"{len(data)} bytes, the DBC says {message.length}: {_first_line(error)}"
                     )
-                    problems = Problems()
-                    problems.error("value", Span(self.source, k, 1), label)
-                    raise SpecError(problems.reported) from None
+                    raise SpecError([Problem("value", Span(self.source, k, 1), label)]) from None
             self.decoded[key] = decoded
         return self.decoded[key]
 

@@ -29,6 +29,8 @@ STAMP_PATTERN = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)"
 """Pattern of a decimal number without an exponent."""
 STAMP_LINES = re.compile(rf"(?:{STAMP_PATTERN}\n)*+{STAMP_PATTERN}", re.ASCII)
 """Pattern of decimal numbers without exponents, one on each line, as in most time columns."""
+INFINITY = re.compile(r"[+-]?inf(?:inity)?", re.IGNORECASE | re.ASCII)
+"""Pattern of an infinite number."""
 STAMP_CACHE_SIZE = 2**16
 """Number of cached time stamps; recordings of one logger often share their stamps."""
 POWERS_OF_TEN = [10**k for k in range(MAX_STAMP_LENGTH + 1)]
@@ -114,7 +116,7 @@ class ChannelReader:
             if value is not None:
                 value = value * factor if factor != 1 else value
             elif name == self.mapping.time or text:
-                label = f"the time stamp `{text}` is not a number" if text else "no time stamp"
+                label = _explain_stamp(text) if text else "no time stamp"
                 self.problems.error("time", samples.place(k), label)
             if value is not None:
                 number = samples.values[k] or 0.0
@@ -297,3 +299,16 @@ def _parse_stamp(text: str) -> Fraction | None:
     is_plain = "e" not in text and "E" not in text
     value = Fraction(int(whole + part), 10 ** len(part)) if is_plain else Fraction(text)
     return value if abs(value.numerator) < TIME_LIMIT * value.denominator else None
+
+
+def _explain_stamp(text: str) -> str:
+    """Return why a text is no time stamp: infinite, too long, too large or no number."""
+    shown = text if len(text) <= MAX_STAMP_LENGTH else text[:MAX_STAMP_LENGTH] + "..."
+    label = f"the time stamp `{shown}`"
+    if INFINITY.fullmatch(text):
+        return f"{label} is not finite"
+    if not DECIMAL.fullmatch(text):
+        return f"{label} is not a number"
+    if len(text) > MAX_STAMP_LENGTH:
+        return f"{label} has more than {MAX_STAMP_LENGTH} characters"
+    return f"{label} is too large: its magnitude must be below {TIME_LIMIT:.0e}"

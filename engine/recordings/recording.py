@@ -22,16 +22,20 @@ from engine.recordings.recording_file import RecordedFile, require_regular_file
 from engine.recordings.recording_window import strip_window_suffix, windows_in_use
 from language.model.system import ColumnMapping, RecordingMap, Window
 from language.overlays.expand_document import display_path
-from language.text.diagnostic import Problems, Source
+from language.text.diagnostic import Problems, Source, Span
 
 
 @dataclass(frozen=True)
 class Channel:
-    """Signal with exact, increasing time stamps [s] and values in SI, both (n_samples,)."""
+    """Signal with exact, increasing time stamps [s] and values in SI, both (n_samples,).
+
+    `clock` is the column of its time stamps; empty if the file stamps each channel.
+    """
 
     column: ColumnMapping
     times: tuple[Fraction, ...]
     values: tuple[float, ...]
+    clock: str = ""
 
     @cached_property
     def seconds(self) -> NDArray[np.float64]:
@@ -45,7 +49,7 @@ class Channel:
 
     def slice_samples(self, selection: slice) -> Channel:
         """Return the channel with a slice of its samples; `seconds` and `array` are sliced too."""
-        part = Channel(self.column, self.times[selection], self.values[selection])
+        part = Channel(self.column, self.times[selection], self.values[selection], self.clock)
         vars(part).update(seconds=self.seconds[selection], array=self.array[selection])
         return part
 
@@ -55,7 +59,7 @@ class Recording:
     """Channels that a map takes from a file, by their names in the map.
 
     `start` and `end` [s] are the first and last time. `windows` [s] are the times to use, in order;
-    empty means all.
+    empty means all. `place` is that of the file, for messages.
     """
 
     name: str
@@ -63,6 +67,7 @@ class Recording:
     end: Fraction
     start: Fraction = Fraction(0)
     windows: tuple[Window, ...] = ()
+    place: Span | None = None
 
     def is_used(self, time: Fraction) -> bool:
         """Return whether a time [s] lies in a window, ends included; True without windows."""
@@ -87,7 +92,9 @@ def crop(recording: Recording, window: Window) -> Recording:
         if first < last:
             channels[name] = channel.slice_samples(slice(first, last))
     start, end = max(window[0], recording.start), min(window[1], recording.end)
-    return Recording(recording.name, channels, end, start, (window,))
+    return dataclasses.replace(
+        recording, channels=channels, end=end, start=start, windows=(window,)
+    )
 
 
 def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Recording:
@@ -112,7 +119,14 @@ def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Re
     require_names(file, names, mapping, problems)
     problems.raise_if_errors()
     reader = ChannelReader(file, mapping, problems)
-    channels = {column.name: Channel(column, *reader.samples(column)) for column in columns}
+    channels = {
+        column.name: Channel(
+            column,
+            *reader.samples(column),
+            clock="" if file.is_stamped else column.time or mapping.time,
+        )
+        for column in columns
+    }
     problems.raise_if_errors()
     _share_seconds(channels.values())
     ends = [*reader.clock[:1], *reader.clock[-1:]]
@@ -121,7 +135,9 @@ def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Re
     known = [time for time in ends if time is not None]
     windows = windows_in_use(path, mapping, problems)
     problems.raise_if_errors()
-    return crop_to_windows(Recording(path.name, channels, max(known), min(known), windows), mapping)
+    place = Span(Source(display_path(strip_window_suffix(path))), 1, 1)
+    recording = Recording(path.name, channels, max(known), min(known), windows, place)
+    return crop_to_windows(recording, mapping)
 
 
 def _share_seconds(channels: Iterable[Channel]) -> None:

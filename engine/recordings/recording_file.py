@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from language.text.diagnostic import Problems, Source, Span, SpecError
+from language.text.diagnostic import Problem, Source, Span, SpecError
 
 MAX_BYTES = 512 * 1024 * 1024
 """Largest size of a recording, after decompression."""
@@ -66,15 +66,11 @@ def require_size(path: Path, source: Source) -> None:
     except OSError as error:
         raise unreadable_error(source, f"read: {error.strerror or error}") from None
     if size > MAX_BYTES:
-        problems = Problems()
-        problems.error(
-            "huge", Span(source, 1, 1), f"the recording is larger than {MAX_BYTES} bytes"
+        raise SpecError(
+            [Problem("huge", Span(source, 1, 1), f"the recording is larger than {MAX_BYTES} bytes")]
         )
-        raise SpecError(problems.reported)
     if not size:
-        problems = Problems()
-        problems.error("empty", Span(source, 1, 1), "the recording is empty")
-        raise SpecError(problems.reported)
+        raise SpecError([Problem("empty", Span(source, 1, 1), "the recording is empty")])
 
 
 def require_regular_file(path: Path, source: Source) -> None:
@@ -97,9 +93,9 @@ def unreadable_error(source: Source, action: str, help: str = "") -> SpecError:
 
     `action` is a participle with its reason, as in `read: no access`; `help` is the hint.
     """
-    problems = Problems()
-    problems.error("unreadable", Span(source, 1, 1), f"the recording cannot be {action}", help)
-    return SpecError(problems.reported)
+    return SpecError(
+        [Problem("unreadable", Span(source, 1, 1), f"the recording cannot be {action}", help)]
+    )
 
 
 def exact_fraction(value: float) -> Fraction:

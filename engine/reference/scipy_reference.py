@@ -13,17 +13,15 @@ from functools import partial
 
 import numpy as np
 from filterpy.common import van_loan_discretization
-from numpy.typing import NDArray
 from scipy import linalg
 
 from engine.interpreter.interpreter import Interpreter, Stepper
 from engine.reference.scipy_stepper import ScipyMethod, ScipyStepper
+from engine.results.array_types import Reals
 from engine.results.trajectory import Trajectory
 from engine.simulation.simulate import simulate
 from language.ir.program import ObserverInfo, Program
 from language.model.system import Scenario, System
-
-Reals = NDArray[np.float64]
 
 NEGLIGIBLE_RATIO = 1e-9
 """Largest ratio to its matrix of an entry that the Program omits as 0 (rule 17f)."""

@@ -13,11 +13,11 @@ from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from engine.execution.event_loop import SimulationStopped
 from engine.interpreter.interpreter import Interpreter
+from engine.results.array_types import Reals
 from language.ir.program import ModeInfo, Program, unqualified_name
 from language.ir.root_region import CHART
 
@@ -28,13 +28,10 @@ DOP853 is explicit of order 8, Radau implicit of order 5 (Hairer, Norsett, Wanne
 Differential Equations I, II.5, and II, IV.8); LSODA switches between stiff and nonstiff methods
 (Petzold 1983).
 """
-SCIPY_METHODS: tuple[ScipyMethod, ...] = ("DOP853", "Radau", "LSODA")
-"""All methods of scipy that are supported."""
 StateVector = list[float]
 """States in SI, in the order of the Program."""
 Solution = Callable[[float], StateVector]
 """States in SI at a time [s] since the start of a flow."""
-Reals = NDArray[np.float64]
 
 INTEGRATION_BLOCKS = (
     "flow",

@@ -6,7 +6,6 @@ import fnmatch
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -14,8 +13,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from engine.results.mode_band import PALETTE, ModeBand, draw_band, label_segments
-from engine.results.sampled_run import SampledRun
+from engine.results.sampled_run import SampledRun, matches_any
 from language.readers.mode_reader import IMPLICIT_MODE
+from language.text.arguments import PathText, to_choice, to_path
 from language.text.diagnostic import suggest_name
 from language.text.sanitise import escape_invisible
 
@@ -68,17 +68,19 @@ class Picture:
     def data(self, form: str = "png") -> bytes:
         """Return the picture as bytes of a format of matplotlib: `png` (130 dpi), `svg`, `pdf`.
 
-        The bytes have no date. Raises ValueError for an unknown format.
+        The bytes have no date. Raises ValueError for an unknown format; it names the formats.
         """
+        to_choice(form, self.figure.canvas.get_supported_filetypes(), "form")
         buffer = io.BytesIO()
         metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form, {})
         with matplotlib.rc_context({"svg.hashsalt": "modewright"}):
             self.figure.savefig(buffer, format=form, dpi=130, metadata=metadata)
         return buffer.getvalue()
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: PathText) -> None:
         """Write the picture to a file, replacing it; its suffix gives the format, as in `data`."""
-        Path(path).write_bytes(self.data(Path(path).suffix.lower()[1:]))
+        file = to_path(path, "path")
+        file.write_bytes(self.data(file.suffix.lower()[1:]))
 
     def _repr_png_(self) -> bytes:
         """Return the picture as PNG for a notebook."""
@@ -136,15 +138,16 @@ def draw_overview(
     Patterns are those of fnmatch, with case. Mode signals of more than the implicit mode are bands,
     others panels (`panels_by_unit`). Lines of the second run are dashed in the colours of the
     first, and names get `labels`. The title is `title`, else the names of the runs. Raises
-    ValueError if a pattern matches no signal.
+    ValueError if a pattern matches no signal, and if no sample lies in `span`.
     """
     _require_matches(runs, patterns)
+    _require_samples(runs, span)
     two = len(runs) > 1
     bands = [
         ModeBand(name.removesuffix(".mode") + (f", {labels[run]}" if two else ""), name, run)
         for name in dict.fromkeys(name for each in runs for name in each.modes)
         for run, each in enumerate(runs)
-        if name in each.signals and _matches(name, patterns) and _has_modes(each, name)
+        if name in each.signals and matches_any(name, patterns) and _has_modes(each, name)
     ]
     title = title or " and ".join(dict.fromkeys(run.name for run in runs))
     return draw_picture(runs, panels_by_unit(runs, patterns, labels), bands, title, span)
@@ -164,7 +167,7 @@ def panels_by_unit(
     for run in runs:
         for name in run.signals:
             of_unit = by_unit.setdefault(run.units[name], [])
-            if name not in run.modes and name not in of_unit and _matches(name, patterns):
+            if name not in run.modes and name not in of_unit and matches_any(name, patterns):
                 of_unit.append(name)
     panels = []
     for unit, names in by_unit.items():
@@ -220,11 +223,6 @@ def axis_title(unit: str) -> str:
     return f"{QUANTITIES.get(unit, '')} [{unit}]".strip()
 
 
-def _matches(name: str, patterns: Sequence[str]) -> bool:
-    """Return whether a name matches one of the patterns; True without patterns."""
-    return not patterns or any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
-
-
 def _require_matches(runs: Sequence[SampledRun], patterns: Sequence[str]) -> None:
     """Raise ValueError for a pattern that matches no signal."""
     known = list(dict.fromkeys(name for run in runs for name in run.signals))
@@ -232,6 +230,14 @@ def _require_matches(runs: Sequence[SampledRun], patterns: Sequence[str]) -> Non
         if not fnmatch.filter(known, pattern):
             hint = suggest_name(pattern, known) or f"signals: {', '.join(known)}"
             raise ValueError(f"no signal matches `{pattern}`: {hint}")
+
+
+def _require_samples(runs: Sequence[SampledRun], span: tuple[float, float] | None) -> None:
+    """Raise ValueError if the runs have samples, but none of them lies in a span [s]."""
+    times = np.concatenate([run.times for run in runs])
+    if span and len(times) and not np.any((times >= span[0]) & (times <= span[1])):
+        covered = f"they cover {np.min(times):g} s to {np.max(times):g} s"
+        raise ValueError(f"no sample lies in {span[0]:g} s to {span[1]:g} s: {covered}")
 
 
 def _time_window(

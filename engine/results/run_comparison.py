@@ -7,13 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from engine.results.sampled_run import Event, SignalArray
+from engine.results.array_types import Reals
+from engine.results.sampled_run import SignalArray, matches_any
 from engine.results.trajectory import Trajectory
 from language.ir.root_region import CHART
-
-Reals = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -113,10 +111,11 @@ def compare_runs(
     `patterns` (fnmatch) select signals, `span` [s] limits the time. A signal may differ by the
     larger of `relative` times its peak in `a` and its tolerances (patterns of names with values in
     SI); without both by nothing. Windows of different modes up to `slack` [s] are left out. Raises
-    ValueError for runs without common time or signal, for different units and for a tolerance that
-    matches no common signal.
+    ValueError for runs without common time or signal, for different units, for a tolerance that
+    matches no common signal, and for one that is negative or not finite.
     """
-    names = [name for name in a.signals if _matches(name, patterns)]
+    _require_tolerances({"relative": relative, "slack": slack, **(tolerances or {})})
+    names = [name for name in a.signals if matches_any(name, patterns)]
     common = [name for name in names if name in b.signals]
     times, uncovered = _common_times(a, b, span)
     _require_comparable(a, b, common, tolerances or {})
@@ -135,7 +134,7 @@ def compare_runs(
         windows=tuple(window for window in windows if window.end - window.start > slack),
         sequences=tuple(_compare_mode_sequences(a, b, common, bounds)),
         only_a=tuple(name for name in names if name not in b.signals),
-        only_b=tuple(n for n in b.signals if n not in a.signals and _matches(n, patterns)),
+        only_b=tuple(n for n in b.signals if n not in a.signals and matches_any(n, patterns)),
         uncovered=uncovered,
     )
 
@@ -181,6 +180,13 @@ def _common_times(
     return times, max(starts) - min(starts) + max(ends) - min(ends)
 
 
+def _require_tolerances(values: Mapping[str, float]) -> None:
+    """Raise ValueError for a tolerance, by name, that is negative or not finite."""
+    for name, value in values.items():
+        if not 0.0 <= value < np.inf:
+            raise ValueError(f"the tolerance `{name}` is {value}: it is finite and at least 0")
+
+
 def _require_comparable(
     a: Trajectory, b: Trajectory, common: Sequence[str], tolerances: Mapping[str, float]
 ) -> None:
@@ -196,11 +202,6 @@ def _require_comparable(
     for pattern in tolerances:
         if not fnmatch.filter(common, pattern):
             raise ValueError(f"no common signal matches the tolerance of `{pattern}`")
-
-
-def _matches(name: str, patterns: Sequence[str]) -> bool:
-    """Return whether a name matches one of the patterns; True without patterns."""
-    return not patterns or any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
 
 
 def _tolerance_of(
@@ -285,8 +286,9 @@ def _compare_mode_sequences(
         events_a, events_b = (
             [
                 event
-                for event in _events_within(run.events_of(instance), span)
-                if event.region == region
+                for event in run.events
+                if (event.instance, event.region) == (instance, region)
+                and span[0] <= event.time <= span[1]
             ]
             for run in (a, b)
         )
@@ -300,8 +302,3 @@ def _compare_mode_sequences(
         name = instance if region == CHART else f"{instance}.{region}"
         sequences.append(ModeSequence(name, len(events_a), len(events_b), parted, time_distance))
     return sequences
-
-
-def _events_within(events: Sequence[Event], span: tuple[float, float]) -> list[Event]:
-    """Return the events within a time span [s], ends included."""
-    return [event for event in events if span[0] <= event.time <= span[1]]

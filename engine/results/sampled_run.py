@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import fnmatch
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -61,3 +62,8 @@ class SampledRun(Protocol):
     @property
     def events(self) -> tuple[Event, ...]:
         """Transitions and violations, in the order of time."""
+
+
+def matches_any(name: str, patterns: Sequence[str]) -> bool:
+    """Return whether a name matches one of the patterns of fnmatch; True without patterns."""
+    return not patterns or any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)

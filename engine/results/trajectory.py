@@ -13,7 +13,15 @@ from numpy.typing import NDArray
 
 from engine.results.sampled_run import Event, SignalArray
 from language.ir.program import Program
-from language.text.diagnostic import MissingToolError
+from language.text.arguments import (
+    PathTexts,
+    TimeWindow,
+    optional,
+    to_some_texts,
+    to_text,
+    to_time_window,
+)
+from language.text.diagnostic import MissingToolError, suggest_name
 
 if TYPE_CHECKING:
     from engine.results.plot import Picture
@@ -42,8 +50,19 @@ class Trajectory:
     faults: tuple[str, ...] = ()
 
     def events_of(self, instance: str) -> tuple[Event, ...]:
-        """Return the events of one instance, in the order of time."""
-        return tuple(event for event in self.events if event.instance == instance)
+        """Return the events of one instance, in the order of time.
+
+        Raises ValueError for a name without event and without signal. A run in which the names of
+        signals lack the instance, such as a replay, gives an empty tuple instead.
+        """
+        found = tuple(event for event in self.events if event.instance == instance)
+        if not found and all("." in name for name in self.signals):
+            known = {name.partition(".")[0]: None for name in self.signals}
+            known.update((event.instance, None) for event in self.events)
+            if known and to_text(instance, "instance") not in known:
+                hint = suggest_name(instance, known) or f"instances: {', '.join(known)}"
+                raise ValueError(f"no event and no signal is of an instance `{instance}`: {hint}")
+        return found
 
     def csv(self) -> str:
         """Return the samples as CSV text with the header `column_headers`, commas and line feeds.
@@ -83,15 +102,17 @@ class Trajectory:
         frame.attrs["units"] = dict(self.units)
         return frame
 
-    def plot(self, signals: Sequence[str] = (), span: tuple[float, float] | None = None) -> Picture:
+    def plot(self, signals: PathTexts | None = None, span: TimeWindow | None = None) -> Picture:
         """Return a picture of signals by unit, modes and events (`draw_overview`).
 
-        `signals` are patterns such as `plant.*`; all signals if empty. `span` is the shown time
-        [s], by default the whole run. Raises ValueError if a pattern matches no signal.
+        `signals` is a pattern such as `plant.*` or a list of patterns; None means all signals.
+        `span` is the shown time [s], by default the whole run. Raises ValueError for an empty list
+        and for a pattern that matches no signal.
         """
         from engine.results.plot import draw_overview
 
-        return draw_overview([self], signals, span)
+        patterns = optional(to_some_texts, signals, "signals") or ()
+        return draw_overview([self], patterns, optional(to_time_window, span, "span"))
 
 
 def column_headers(trajectory: Trajectory) -> list[str]:

@@ -10,7 +10,7 @@ from fractions import Fraction
 
 from language.ir.program import Program
 from language.model.system import Scenario, Stimulus, System
-from language.text.diagnostic import Problems, SpecError
+from language.text.diagnostic import Problem, SpecError
 
 MAX_INSTANTS = 100_000_000
 """Largest number of ticks, samples and rows of a run: about an hour of interpretation."""
@@ -122,9 +122,7 @@ class Schedule:
         count = sum(grid.count(self.horizon) for grid in (self.rows, *self._grids))
         if count > MAX_INSTANTS:
             label = f"the scenario has {count} ticks and rows; at most {MAX_INSTANTS} are run"
-            problems = Problems()
-            problems.error("range", scenario.span, label, "a shorter `horizon`")
-            raise SpecError(problems.reported)
+            raise SpecError([Problem("range", scenario.span, label, "a shorter `horizon`")])
 
 
 def _sort_unique(times: Sequence[Fraction]) -> list[Fraction]:

@@ -1,4 +1,4 @@
-"""Input wiring: sets the inputs of the instances of a system from its connections."""
+"""Input connections: sets the inputs of the instances of a system from its connections."""
 
 from __future__ import annotations
 

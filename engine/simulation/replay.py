@@ -102,8 +102,10 @@ def replay(
     count = int((recording.end - start) // program.period) + 1
     if count > MAX_TICKS or count < 1:
         problems = Problems()
-        label = f"the recording spans {count} ticks of {program.period} s; 1 to {MAX_TICKS} is fine"
-        problems.error("range", mapping.span, label)
+        label = f"the recording spans {max(count, 0)} ticks of {program.period} s; "
+        label += f"1 to {MAX_TICKS} is fine"
+        place, hint = recording.place or mapping.span, _explain_span(recording, feeds)
+        problems.error("range", place, label, hint)
         raise SpecError(problems.reported)
     _set_constants(automaton, program, mapping, stepper)
     recorder = _run_ticks(program, stepper, feeds, start, count, on_tick)
@@ -116,6 +118,22 @@ def replay(
         for channel in compared_channels
     ]
     return Replay(trajectory, recorder.innovation_rms(), tuple(c for c in comparisons if c))
+
+
+def _explain_span(recording: Recording, feeds: Sequence[Channel]) -> str:
+    """Return the late start of an input, or the longest pause of the stamps, as a hint."""
+    latest = max(feeds, key=lambda channel: channel.times[0], default=None)
+    if latest is not None and latest.times[0] > recording.end:
+        clock = f" (time `{latest.clock}`)" if latest.clock else ""
+        text = f"`{latest.column.name}`{clock} begins at {float(latest.times[0]):.9g} s, "
+        return text + f"the recording ends at {float(recording.end):.9g} s"
+    stamps = [channel.seconds for channel in recording.channels.values()]
+    ends = [float(recording.start), float(recording.end)]
+    every = np.unique(np.concatenate([*stamps, ends]))
+    if len(every) < 2:
+        return ""
+    k = int(np.argmax(np.diff(every)))
+    return f"the longest pause of its time stamps is from {every[k]:.9g} s to {every[k + 1]:.9g} s"
 
 
 def _run_ticks(

@@ -67,6 +67,12 @@ class FirstOrderLag:
         return value - slope + (self._value - self._input + slope) * _decay(h / self._lag)
 
 
+def philox_of(seed: int, name: str) -> np.random.Philox:
+    """Return the generator of a named stream, keyed by the seed and the SHA-256 of the name."""
+    digest = hashlib.sha256(name.encode()).digest()
+    return np.random.Philox(key=np.array([seed, int.from_bytes(digest[:8], "little")], np.uint64))
+
+
 def noise_stream(seed: int, name: str) -> Iterator[float]:
     """Yield standard normal numbers of the sensor `name`, without end.
 
@@ -74,9 +80,7 @@ def noise_stream(seed: int, name: str) -> Iterator[float]:
     Parallel random numbers: as easy as 1, 2, 3, SC 2011), keyed by the seed and the first 8 bytes
     of the SHA-256 of the name.
     """
-    digest = hashlib.sha256(name.encode()).digest()
-    key = np.array([seed, int.from_bytes(digest[:8], "little")], dtype=np.uint64)
-    generator = np.random.Generator(np.random.Philox(key=key))
+    generator = np.random.Generator(philox_of(seed, name))
     while True:
         yield from generator.standard_normal(NOISE_CHUNK).tolist()
 
@@ -112,9 +116,10 @@ class SensorRun:
     def sample(self, time: Fraction, measured: float) -> None:
         """Set `value` to a sample at a time [s], with noise and then quantisation, and count it.
 
-        Without a delay it is the lagged signal `measured` [SI]. With a delay `measured` is not
-        used: the sample is the oldest captured value, or the initial one before the first delay is
-        over.
+        Without a delay it is the lagged signal `measured` [SI]; the lag is not advanced. With a
+        delay `measured` is not used: before one delay [s] it is the signal of `start`, without the
+        lag, later the oldest captured value, which is removed (IndexError if there is none). Noise
+        takes the next number of the stream; without noise no number is taken.
         """
         if not self.sensor.delay:
             reading = self.lag.evaluate(time, measured)

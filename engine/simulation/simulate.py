@@ -54,7 +54,7 @@ def simulate(
     until then and the reason in `stopped`. Raises SpecError for mistakes in a recording and for too
     many instants.
     """
-    return _Simulation(system, resolve_recording(system, scenario), build, on_tick, programs).run()
+    return _Simulation(system, resolve_recording(scenario), build, on_tick, programs).run()
 
 
 class _Simulation:

@@ -10,8 +10,8 @@ from fractions import Fraction
 from engine.recordings.recording import Channel, Recording, read_recording
 from language.loading.stimulus_reader import constant_pieces, linear_pieces
 from language.lowering.connection_program import piece_block
-from language.model.system import Scenario, Stimulus, StimulusPiece, System
-from language.text.diagnostic import Problems, SpecError
+from language.model.system import Scenario, Stimulus, StimulusPiece
+from language.text.diagnostic import Problem, SpecError
 
 EvaluateFormula = Callable[[str, float], float]
 """Function that returns the value of a formula piece, by its block and the time [s]."""
@@ -62,12 +62,8 @@ class InputSignal:
             self._latest = max(0, bisect_right(starts, time) - 1)
         return self._latest
 
-    def piece_starts(self) -> list[Fraction]:
-        """Return the times [s] above 0 at which pieces start, in order."""
-        return [start for start in self.starts if start > 0]
 
-
-def resolve_recording(system: System, scenario: Scenario) -> Scenario:
+def resolve_recording(scenario: Scenario) -> Scenario:
     """Return a scenario in which the inputs of a recording are stimuli.
 
     Without a recording the scenario itself is returned. Time 0 is the first time at which every
@@ -84,10 +80,8 @@ def resolve_recording(system: System, scenario: Scenario) -> Scenario:
     fed = [recording.channels[s.column] for s in scenario.inputs.values() if s.column]
     start = max((channel.times[0] for channel in fed), default=Fraction(0))
     if recording.end <= start:
-        problems = Problems()
         label = "the recording ends before every input has a value"
-        problems.error("range", use.span, label)
-        raise SpecError(problems.reported)
+        raise SpecError([Problem("range", use.span, label)])
     return dataclasses.replace(
         scenario,
         horizon=recording.end - start if scenario.horizon is None else scenario.horizon,

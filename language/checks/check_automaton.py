@@ -290,8 +290,9 @@ class _AutomatonChecker:
         scope = self._scope([automaton.parameters], "among the parameters")
         check = TypeChecker(scope, self.problems)
         trees: dict[str, SyntaxTree] = {}
+        of_model = automaton.model.parameters if automaton.model else {}
         for parameter in automaton.parameters.values():
-            if parameter.derived and parameter.name not in _model_parameters(automaton):
+            if parameter.derived and parameter.name not in of_model:
                 trees[parameter.name] = parameter.derived.tree
                 what = f"the unit of {parameter.name}"
                 check.check_quantity(parameter.derived.tree, parameter.unit.dimension, what)
@@ -438,11 +439,6 @@ class _AutomatonChecker:
         label = f"`{name}` is in `{here}` here and in `{there}` in another mode"
         self.problems.error("dimension", formula.span, label)
         return before
-
-
-def _model_parameters(automaton: Automaton) -> Mapping[str, object]:
-    """Return the parameters of the model; an empty mapping without a model."""
-    return automaton.model.parameters if automaton.model else {}
 
 
 def _event_names(automaton: Automaton) -> frozenset[str]:

@@ -165,7 +165,7 @@ class _ModeGuards:
         The wait is 0 without `wait`.
         """
         if transition.key not in self.waits:
-            self.waits[transition.key] = _longest_wait(self.automaton, transition)
+            self.waits[transition.key] = _wait_range(self.automaton, transition)[1]
         return self.waits[transition.key]
 
     def _lower_guard(self, transition: Transition) -> Expr | None:
@@ -237,7 +237,7 @@ class _ModeGuards:
         if guard is None:
             return False
         before = {each.key for each in preceding_transitions(self.automaton, self.mode, transition)}
-        wait = _shortest_wait(self.automaton, transition)
+        wait = _wait_range(self.automaton, transition)[0]
         first = self._earlier_transitions(transition)
         at_once = [each for each in first if each.key in before and not self.wait_of(each)]
         lasted = self._active_for(wait)
@@ -263,7 +263,7 @@ class _ModeGuards:
 
         Only transitions with a lowered guard are returned.
         """
-        wait = _shortest_wait(self.automaton, transition)
+        wait = _wait_range(self.automaton, transition)[0]
         before = {
             each.key: each for each in preceding_transitions(self.automaton, self.mode, transition)
         }
@@ -333,16 +333,6 @@ def _describe_guard(transition: Transition) -> str:
 def _wait_seconds(automaton: Automaton, transition: Transition) -> Fraction:
     """Return the wait of a transition [s], exactly; 0 without `wait`."""
     return evaluate_exactly(transition.wait, automaton) if transition.wait else Fraction(0)
-
-
-def _shortest_wait(automaton: Automaton, transition: Transition) -> Fraction:
-    """Return the shortest wait of a transition: ticks if the automaton is sampled, else [s]."""
-    return _wait_range(automaton, transition)[0]
-
-
-def _longest_wait(automaton: Automaton, transition: Transition) -> Fraction:
-    """Return the longest wait; it differs from the shortest if the wait is tunable."""
-    return _wait_range(automaton, transition)[1]
 
 
 def _wait_range(automaton: Automaton, transition: Transition) -> Range:

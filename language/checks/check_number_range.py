@@ -28,9 +28,8 @@ def check_numbers(automaton: Automaton, problems: Problems) -> None:
     for value, span in dict.fromkeys(_numbers_in(automaton)):
         rounded = round_to_type(value, number)
         if math.isinf(rounded):
-            label = (
-                f"{_format_short(value)} is beyond the largest {number}, {_largest_float32():.4g}"
-            )
+            largest = f"{number}, {(2.0 - 2.0**-23) * 2.0**127:.4g}"
+            label = f"{_format_short(value)} is beyond the largest {largest}"
             problems.error("value", span, label, "`numbers: float64` has room for it")
         elif rounded == 0.0 and value != 0:
             label = f"{_format_short(value)} is 0 in {number}"
@@ -85,11 +84,6 @@ def _numbers_in(part: object) -> Iterator[tuple[Fraction, Span]]:
         case _ if dataclasses.is_dataclass(part) and not isinstance(part, type | Span):
             for field in dataclasses.fields(part):
                 yield from _numbers_in(getattr(part, field.name))
-
-
-def _largest_float32() -> float:
-    """Return the largest finite float32."""
-    return (2.0 - 2.0**-23) * 2.0**127
 
 
 def _format_short(value: Fraction) -> str:

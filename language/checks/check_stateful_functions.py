@@ -1,4 +1,4 @@
-"""Check of functions with memory: constant times, bounded delays, arguments known in every mode."""
+"""Check stateful functions: constant times, bounded delays, arguments known in every mode."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Warnings of a checked automaton: reports constructs that are valid and probably not intended.
+"""Warning checks: reports constructs that are valid and probably not intended.
 
 They are computed by `check` and not when a spec is only loaded. An automaton with errors has no
 warnings.

@@ -21,7 +21,7 @@ from language.expressions.syntax_tree import (
     Relation,
     SyntaxTree,
 )
-from language.text.diagnostic import Problems, Span, SpecError
+from language.text.diagnostic import Problem, Span, SpecError
 
 MAX_POWER = 8
 """Largest size of the exponent in `x^n`."""
@@ -104,10 +104,10 @@ def _build_power(builder: _AstBuilder, parts: list[Any]) -> SyntaxTree:
     base, token = parts
     exponent = int(builder.texts[token])
     if abs(exponent) > MAX_POWER:
-        problems = Problems()
         label = f"a power is at most {MAX_POWER}"
-        problems.error("power", builder.token_span(token), label, "multiply two powers: `x^8 * x`")
-        raise SpecError(problems.reported)
+        raise SpecError(
+            [Problem("power", builder.token_span(token), label, "multiply two powers: `x^8 * x`")]
+        )
     return Power(base, exponent, builder.joined_span(base, token))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from language.expressions.syntax_tree import Arithmetic, FunctionCall, Name, SyntaxTree, walk
-from language.text.diagnostic import Problems, SpecError
+from language.text.diagnostic import Problem, SpecError
 
 
 def coefficient_of(left: SyntaxTree, state: str) -> SyntaxTree | SpecError | None:
@@ -39,7 +39,5 @@ def _has_derivative(tree: SyntaxTree) -> bool:
 
 def _balance_error(left: SyntaxTree, state: str) -> SpecError:
     """Return the error for a left side of another form."""
-    problems = Problems()
     label = f"the left side is `coefficient * der({state})` with der once"
-    problems.error("balance", left.span, label)
-    return SpecError(problems.reported)
+    return SpecError([Problem("balance", left.span, label)])

@@ -34,7 +34,7 @@ from language.expressions.syntax_tree import (
     SyntaxTree,
     names,
 )
-from language.text.diagnostic import Problems, Span, SpecError
+from language.text.diagnostic import Problem, Span, SpecError
 
 PointValue = Callable[[SyntaxTree], float | bool]
 """A function that gives the value of an expression at the point.
@@ -153,9 +153,7 @@ def decide_condition(condition: SyntaxTree, value_at: PointValue) -> bool:
 
 def derivative_error(span: Span, label: str, help: str = "") -> SpecError:
     """Return a SpecError with one problem of kind "derivative" at `span`; it is not raised."""
-    problems = Problems()
-    problems.error("derivative", span, label, help)
-    return SpecError(problems.reported)
+    return SpecError([Problem("derivative", span, label, help)])
 
 
 def _differentiate_arithmetic(

@@ -43,6 +43,8 @@ def reserved_words() -> Mapping[str, frozenset[str]]:
 
 
 NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}")
+DOCUMENT_NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
+"""Form of the names of documents that are no identifiers in C."""
 
 COMMA_HINT = "in `{...}` YAML ends a value at a comma: quote a value that has one"
 
@@ -64,8 +66,7 @@ def check_name(name: str, span: Span, problems: Problems) -> None:
     elif name in words["GRAMMAR"]:
         problems.error("name", span, f"`{name}` is a word of the language", another)
     elif name.lower() in words["YAML"]:
-        label = f"`{name}` means something else to other YAML tools: they read true, false or null"
-        problems.error("name", span, label, another)
+        _report_word_of_yaml(name, span, problems)
     elif name in words["GENERATED"]:
         label = f"`{name}` has a meaning of its own in generated code"
         problems.error("name", span, label, another)
@@ -75,6 +76,26 @@ def check_name(name: str, span: Span, problems: Problems) -> None:
                 label = f"`{name}` is a word of {language}, and generated files keep the names"
                 problems.error("name", span, label, another)
                 return
+
+
+def check_document_name(name: str, span: Span, problems: Problems) -> None:
+    """Report the name of a document that is in no C, with one problem of kind "name" at most.
+
+    These are systems, scenarios, maps, variants, calibrations, studies and tests. The form is that
+    of DOCUMENT_NAME_PATTERN; the words of YAML are reported as in `check_name`. The words of the
+    language, of C and of A2L are allowed. An automaton and an effect follow stricter rules.
+    """
+    if not DOCUMENT_NAME_PATTERN.fullmatch(name):
+        hint = "a letter, then at most 62 letters, digits or `_`"
+        problems.error("name", span, f"`{name}` is not a name", hint)
+    elif name.lower() in reserved_words()["YAML"]:
+        _report_word_of_yaml(name, span, problems)
+
+
+def _report_word_of_yaml(name: str, span: Span, problems: Problems) -> None:
+    """Report a name that other tools for YAML do not read as a text."""
+    label = f"`{name}` means something else to other YAML tools: they read true, false or null"
+    problems.error("name", span, label, f"another name, like `{name}_1`")
 
 
 def check_variable_name(name: str, span: Span, problems: Problems) -> None:

@@ -10,7 +10,7 @@ from functools import lru_cache
 from language.expressions.syntax_tree import NumberLiteral
 from language.expressions.tokens import UNIT_PATTERN
 from language.expressions.units import NO_UNIT, Unit, UnitError, parse_unit, unit_hint
-from language.text.diagnostic import Problems, Span, SpecError
+from language.text.diagnostic import Problem, Problems, Span, SpecError
 
 UNIT_HINT = "a unit is written like `W`, `N*m`, `1/s`, a product with `*`: `2 * x`"
 DECIMAL_PATTERN = re.compile(r"(0|[1-9]\d*)(\.\d+)?([eE][-+]?\d+)?")
@@ -95,10 +95,8 @@ def _missing_blank_hint(text: str) -> str:
 def _require_in_range(value: Fraction, text: str, span: Span) -> Fraction:
     """Return the value. Raises SpecError if it is out of the range of a double."""
     if abs(value) > MAX_QUANTITY:
-        problems = Problems()
         label = f"`{text}` is out of the range of a double"
-        problems.error("number", span, label)
-        raise SpecError(problems.reported)
+        raise SpecError([Problem("number", span, label)])
     return value
 
 
@@ -113,7 +111,5 @@ def _parse_unit(text: str, span: Span) -> Unit:
     try:
         return parse_unit(text)
     except UnitError as error:
-        problems = Problems()
         hint = unit_hint(text) or UNIT_HINT
-        problems.error("unit", span, str(error), hint)
-        raise SpecError(problems.reported) from None
+        raise SpecError([Problem("unit", span, str(error), hint)]) from None

@@ -1,4 +1,4 @@
-"""Token shapes: the parse tree of an expression as a function of the kinds of its tokens.
+"""Parse tree: the parse tree of an expression as a function of the kinds of its tokens.
 
 lark parses each sequence of token kinds once: `a + 2 * b` and `x_1 - 7.5 / y` have the same shape.
 A text with other tokens is parsed by lark itself.

@@ -9,14 +9,38 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
+from typing import Any, TypeVar
 
 from language.expressions.units import NO_UNIT, Unit
 from language.text.diagnostic import Span
 
+NodeT = TypeVar("NodeT")
 
+
+class _Node:
+    """A node of a syntax tree. Its hash covers the tree below it and is computed once."""
+
+    __slots__ = ("_hash",)
+
+
+def _hash_once(node_class: type[NodeT]) -> type[NodeT]:
+    """Return the class with a hash that each node computes at its first use and stores."""
+    compute_hash = node_class.__hash__
+
+    def cached_hash(self: Any) -> int:
+        try:
+            return int(self._hash)
+        except AttributeError:
+            object.__setattr__(self, "_hash", compute_hash(self))
+            return int(self._hash)
+
+    node_class.__hash__ = cached_hash  # type: ignore[method-assign]
+    return node_class
+
+
+@_hash_once
 @dataclass(frozen=True, slots=True)
-class NumberLiteral:
+class NumberLiteral(_Node):
     """A number: its exact value in SI and its unit.
 
     A 0 without a unit is compatible with any dimension.
@@ -32,40 +56,45 @@ class NumberLiteral:
         return self.value == 0 and self.unit is NO_UNIT
 
 
+@_hash_once
 @dataclass(frozen=True, slots=True)
-class BoolLiteral:
+class BoolLiteral(_Node):
     """`true` or `false`."""
 
     value: bool
     span: Span = field(compare=False, repr=False)
 
 
+@_hash_once
 @dataclass(frozen=True, slots=True)
-class Name:
+class Name(_Node):
     """A name or a dotted path."""
 
     path: str
     span: Span = field(compare=False, repr=False)
 
 
+@_hash_once
 @dataclass(frozen=True, slots=True)
-class Negation:
+class Negation(_Node):
     """Unary minus."""
 
     operand: SyntaxTree
     span: Span = field(compare=False, repr=False)
 
 
+@_hash_once
 @dataclass(frozen=True, slots=True)
-class Not:
+class Not(_Node):
     """Logical negation."""
 
     operand: SyntaxTree
     span: Span = field(compare=False, repr=False)
 
 
+@_hash_once
 @dataclass(frozen=True, slots=True)
-class Arithmetic:
+class Arithmetic(_Node):
     """A sum, difference, product or quotient of two operands."""
 
     operator: str
@@ -74,8 +103,9 @@ class Arithmetic:
     span: Span = field(compare=False, repr=False)
 
 
+@_hash_once
 @dataclass(frozen=True, slots=True)
-class Logic:
+class Logic(_Node):
     """`and` or `or` of two conditions; both sides are evaluated."""
 
     operator: str
@@ -90,8 +120,9 @@ FLIPPED_RELATION = {"<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "==", "!="
 """The relation of two operands that are exchanged."""
 
 
+@_hash_once
 @dataclass(frozen=True, slots=True)
-class Relation:
+class Relation(_Node):
     """A relation `< <= > >= == !=` of two operands."""
 
     operator: str
@@ -100,8 +131,9 @@ class Relation:
     span: Span = field(compare=False, repr=False)
 
 
+@_hash_once
 @dataclass(frozen=True, slots=True)
-class Power:
+class Power(_Node):
     """`x^n` with a literal integer n."""
 
     base: SyntaxTree
@@ -109,8 +141,9 @@ class Power:
     span: Span = field(compare=False, repr=False)
 
 
+@_hash_once
 @dataclass(frozen=True, slots=True)
-class Conditional:
+class Conditional(_Node):
     """`if condition then ... else ...`."""
 
     condition: SyntaxTree
@@ -119,8 +152,9 @@ class Conditional:
     span: Span = field(compare=False, repr=False)
 
 
+@_hash_once
 @dataclass(frozen=True, slots=True)
-class FunctionCall:
+class FunctionCall(_Node):
     """A function applied to arguments."""
 
     function: str
@@ -128,8 +162,9 @@ class FunctionCall:
     span: Span = field(compare=False, repr=False)
 
 
+@_hash_once
 @dataclass(frozen=True, slots=True)
-class ErrorNode:
+class ErrorNode(_Node):
     """An expression that could not be parsed; its problem has been reported."""
 
     span: Span = field(compare=False, repr=False)

@@ -38,7 +38,7 @@ from language.ir.ops import (
     subtract,
 )
 from language.ir.program import Constant, Variable
-from language.lowering.guard_slots import guard_slots
+from language.lowering.guard_variable_names import guard_slots
 from language.model.automaton import Mode
 from language.model.constant_states import constant_states, ever_varying_states
 
@@ -95,14 +95,13 @@ def clear_constant_series(field: VectorField, mode: str, terms: int) -> list[Op]
     return [Store(f"work.series_{n}", integer(k), real(0.0)) for n in names for k in range(terms)]
 
 
-def merge_time(number: NumberType, step: Fraction, time: Fraction = Fraction(0)) -> float:
+def merge_time(number: NumberType, step: Fraction) -> float:
     """Return the time [s] within which events are one instant (rule 10).
 
-    In float64 it is MERGE_ULPS units in the last place of the larger of step and time [s]: 0.9 ps
-    at 1 s. In float32 it is that of the step, 0.5 us in 1 ms, since times are relative to the step.
+    It is MERGE_ULPS units in the last place of the step [s]: in float64 0.9 ps for 1 s, in float32
+    0.5 us for 1 ms.
     """
-    whole = max(time, step) if number == "float64" else step
-    return float(whole) * MERGE_ULPS * 2.0 ** (1 - SIGNIFICAND_BITS[number])
+    return float(step) * MERGE_ULPS * 2.0 ** (1 - SIGNIFICAND_BITS[number])
 
 
 def continuous_step_blocks(

@@ -45,7 +45,12 @@ from language.lowering.expressions import (
     lower_rate,
     names_read,
 )
-from language.lowering.guard_slots import all_guard_slots, guard_slot, guard_slots, mode_bindings
+from language.lowering.guard_variable_names import (
+    all_guard_slots,
+    guard_slot,
+    guard_slots,
+    mode_bindings,
+)
 from language.lowering.program_builder import equation_variables
 from language.model.automaton import Automaton, Balance, Mode, Transition
 from language.model.declaration import Formula

@@ -20,10 +20,10 @@ def formula_name(expr: Expr) -> str:
     """Return an identifier for an expression: `m_g_r_w`, `per_J_v`, `r_w_cubed`, `half_h`.
 
     Variables lose their group and `at_`. A product joins its names with `_`; sums and quotients
-    insert `plus`, `minus` and `per`; a call starts with its function; 0.5 is `half` and 2 is
-    `twice`. The result is FALLBACK_NAME if the expression contains a kind without a name
-    (comparison, choice, array element, `and`, `or`), or if the name is longer than MAX_NAME_LENGTH
-    or begins with a digit. Names are not unique.
+    insert `plus`, `minus` and `per`; a negation starts with `minus` or `not`, a call with its
+    function; 0.5 is `half` and 2 is `twice`. The result is FALLBACK_NAME if the expression contains
+    a kind without a name (comparison, choice, array element, `and`, `or`), or if the name is longer
+    than MAX_NAME_LENGTH or begins with a digit. Names are not unique.
     """
     name = re.sub(r"[^A-Za-z0-9_]+", "_", _build_name(expr)).strip("_")
     return name if len(name) <= MAX_NAME_LENGTH and not name[:1].isdigit() else FALLBACK_NAME
@@ -76,8 +76,8 @@ def _build_name(expr: Expr) -> str:
             return {0.5: "half", 2.0: "twice"}.get(float(value), f"{value:g}")
         case Ref(name):
             return _plain_name(name)
-        case Unary(_, operand):
-            return f"minus_{_build_name(operand)}"
+        case Unary(operator, operand):
+            return f"{'minus' if operator == '-' else operator}_{_build_name(operand)}"
         case Binary("*", left, right):
             return _power_name(expr) or f"{_build_name(left)}_{_build_name(right)}"
         case Binary("/", Value(1.0), right):

@@ -1,4 +1,4 @@
-"""Regions: the name of the root region, which is the only region of most automata."""
+"""Root region: the name of the root region, which is the only region of most automata."""
 
 from __future__ import annotations
 

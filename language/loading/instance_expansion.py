@@ -1,4 +1,4 @@
-"""Instances of an automaton: expansion of other automata into parallel regions of the host.
+"""Instance expansion: expansion of other automata into parallel regions of the host.
 
 The modes of the instantiated automaton become a region with the name of the instance, such as
 `main`. Its parameters, states, discrete variables and equations get names of the host:
@@ -111,7 +111,7 @@ def expand_instances(tree: MappingNode, project: Project, problems: Problems) ->
 def _rename_output_reads(tree: MappingNode, reads: Mapping[str, str]) -> MappingNode:
     """Return a tree in which outputs of instances are read by the names of their host variables."""
 
-    def change(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+    def change(_path: KeyPath, scalar: ScalarNode) -> ScalarNode:
         """Return an expression with outputs of instances replaced."""
         text, hits = substitute_reads(scalar.text, reads)
         return ScalarNode(text, scalar.span) if hits else scalar
@@ -314,7 +314,7 @@ def _equation_names(mode: MappingNode) -> Iterator[str]:
 def _rename_to_host(body: MappingNode, instance: _InstanceDeclaration) -> MappingNode:
     """Return the tree of an instantiated automaton with all its names replaced by host names."""
 
-    def change(path: KeyPath, scalar: ScalarNode) -> ScalarNode:
+    def change(_path: KeyPath, scalar: ScalarNode) -> ScalarNode:
         """Return an expression with host names."""
         text = rename_names(scalar.text, instance.names)
         return ScalarNode(text, scalar.span) if text != scalar.text else scalar

@@ -32,14 +32,12 @@ def automaton_of(
     return check_automaton(read_automaton(document, project, values, problems), problems)
 
 
-def load_automaton(
-    reference: str, project: Project, values: Mapping[str, YamlNode] | None = None
-) -> Automaton:
+def load_automaton(reference: str, project: Project) -> Automaton:
     """Return the checked automaton of a name or path. Raises SpecError with all problems.
 
-    `values` are new values of parameters by name. Warnings are discarded.
+    Warnings are discarded.
     """
-    return automaton_of(project.read(project.path_of(reference)), project, values)
+    return automaton_of(project.read(project.path_of(reference)), project)
 
 
 def program_of(automaton: Automaton, varying: Collection[str] = ()) -> Program:
@@ -65,12 +63,11 @@ def lower_automaton(automaton: Automaton, varying: Collection[str] = ()) -> Prog
     return lower_continuous_automaton(automaton, problems, varying)
 
 
-def command_line_value(text: str, option: str = "--set", name: str = "") -> ScalarNode:
+def command_line_value(text: str, name: str = "") -> ScalarNode:
     """Return a value of the command line as a scalar; problems point to it in the text `name=text`.
 
-    Without a name they point into `text` alone. `option` is shown as the name of the source. The
-    text is not parsed.
+    Without a name they point into `text` alone. The text is not parsed.
     """
     shown = f"{name}={text}" if name else text
-    place = Span(Source(option, (shown,)), 1, 1 + len(shown) - len(text), max(1, len(text)))
+    place = Span(Source("--set", (shown,)), 1, 1 + len(shown) - len(text), max(1, len(text)))
     return ScalarNode(text, place)

@@ -1,4 +1,4 @@
-"""Event names: the entry of a mode of an instance, from one mode or from any."""
+"""Mode entry event: the entry of a mode of an instance, from one mode or from any."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Map pairing: the columns of a recording map that an automaton uses, and mismatches."""
+"""Recording map columns: the columns of a recording map that an automaton uses, and mismatches."""
 
 from __future__ import annotations
 

@@ -39,7 +39,6 @@ def lower_stage(
     automaton: Automaton,
     formulas: Mapping[str, Formula],
     known: NameBindings,
-    stage_name: str = "reset",
 ) -> list[Op]:
     """Return the operations of one stage: all assignments are evaluated, then all are stored.
 
@@ -47,8 +46,8 @@ def lower_stage(
     `commit_stage`.
     """
     return [
-        *read_stage(automaton, formulas, known, stage_name),
-        *commit_stage(automaton, formulas, stage_name),
+        *read_stage(automaton, formulas, known),
+        *commit_stage(automaton, formulas),
     ]
 
 

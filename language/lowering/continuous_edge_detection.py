@@ -1,4 +1,4 @@
-"""Edge detection in guards of a continuous automaton: `rising`, `falling` and `changed` (rule 8).
+"""Continuous edge detection: `rising`, `falling` and `changed` (rule 8).
 
 The level of an edge is its argument, negated for `falling`. An edge is true while the level is true
 and was false at the last settled instant of the same activation. `memory.level_<n>` holds the level

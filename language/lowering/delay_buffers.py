@@ -208,9 +208,7 @@ def add_delay_bindings(delays: tuple[SampledDelay, ...], known: NameBindings) ->
     return found
 
 
-def record_delays_block(
-    automaton: Automaton, delays: tuple[SampledDelay, ...], known: NameBindings
-) -> Block:
+def record_delays_block(delays: tuple[SampledDelay, ...], known: NameBindings) -> Block:
     """Return the operations that record the delayed values of a tick.
 
     All values are evaluated before the first one is stored. The first record fills a ring buffer;
@@ -238,9 +236,7 @@ def record_delays_block(
     return (*values, *ring, *commit, *done)
 
 
-def sampled_delay_variables(
-    automaton: Automaton, delays: tuple[SampledDelay, ...]
-) -> list[Variable]:
+def sampled_delay_variables(delays: tuple[SampledDelay, ...]) -> list[Variable]:
     """Return the variables of delays; `finalise_program` removes the unused ones.
 
     They are `memory.kept`, `work.slot` and, for each delay, its values, `memory.oldest_<n>` and

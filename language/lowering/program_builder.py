@@ -301,7 +301,7 @@ def finalise_program(
     functions = _used_functions(used, program.number_type)
     interface = ("input.", "is_new.")
     variables = [v for v in program.variables if v.name in used or v.name.startswith(interface)]
-    variables = _remove_unused_before(program, variables, blocks)
+    variables = _remove_unused_before(variables, blocks)
     return round_program(
         dataclasses.replace(
             program,
@@ -313,9 +313,7 @@ def finalise_program(
     )
 
 
-def _remove_unused_before(
-    program: Program, variables: list[Variable], blocks: dict[str, Block]
-) -> list[Variable]:
+def _remove_unused_before(variables: list[Variable], blocks: dict[str, Block]) -> list[Variable]:
     """Return the variables without each `before.<input>` that no block but `retain_inputs` reads.
 
     The block `retain_inputs` in `blocks` is replaced by one without the assignments to them.

@@ -1,4 +1,4 @@
-"""Parameters in a Program: groups, kinds, order of dependence, tunable parameters and units."""
+"""Program parameters: groups, kinds, order of dependence, tunable parameters and units."""
 
 from __future__ import annotations
 

@@ -69,9 +69,11 @@ def has_saturation(automaton: Automaton, variable: Input | State) -> bool:
 
 
 def store_saturated(automaton: Automaton, name: str, value: Expr, key: str = "") -> list[Op]:
-    """Return the operations that write a state or discrete variable, held in its range if any.
+    """Return the operations that write a state or discrete variable.
 
-    Without a range they are one assignment; else those of `assign_saturated`.
+    In a sampled automaton a variable with a range (`saturation_range`) is held in it by
+    `assign_saturated`. Without a range, and in a continuous automaton, which holds no variable in
+    its range, they are one assignment.
     """
     thing = automaton.state_variables[name]
     target = f"{'discrete' if name in automaton.discrete else 'state'}.{name}"
@@ -81,9 +83,10 @@ def store_saturated(automaton: Automaton, name: str, value: Expr, key: str = "")
 
 
 def store_initial_value(automaton: Automaton, name: str, value: Expr, key: str) -> list[Op]:
-    """Return the operations that write the start value of a variable, held in its range if any.
+    """Return the operations that write the start value of a variable, like `store_saturated`.
 
-    If an invalid value would leave the variable unchanged, the lower bound is written first.
+    If the range policy of a sampled automaton leaves the variable unchanged at an invalid value,
+    the lower bound is written first.
     """
     ops = store_saturated(automaton, name, value, key)
     thing = automaton.state_variables[name]

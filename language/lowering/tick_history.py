@@ -126,7 +126,11 @@ def record_tick_history(automaton: Automaton) -> Block:
     record: Block = (
         Assign(
             NEWEST_INDEX.name,
-            Select(_is_last_index(size), integer(0), add(NEWEST_INDEX, integer(1))),
+            Select(
+                Compare(">=", NEWEST_INDEX, integer(size - 1)),
+                integer(0),
+                add(NEWEST_INDEX, integer(1)),
+            ),
         ),
         *(
             Store(f"memory.past_{n}", NEWEST_INDEX, Ref(f"state.{n}"))
@@ -283,11 +287,6 @@ def tick_history_variables(automaton: Automaton) -> list[Variable]:
 def _history_size(automaton: Automaton) -> int:
     """Return the number of ticks that the ring buffers hold: the longest `within`."""
     return max(rollback.max_ticks for rollback in rollbacks_of(automaton))
-
-
-def _is_last_index(size: int) -> Expr:
-    """Return the condition that the newest tick is at the end of the ring buffers."""
-    return Compare(">=", NEWEST_INDEX, integer(size - 1))
 
 
 def _transitive_reads(mode: Mode, names: Iterable[str]) -> set[str]:

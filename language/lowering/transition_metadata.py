@@ -17,7 +17,7 @@ from language.ir.ops import (
 )
 from language.ir.program import TransitionInfo
 from language.lowering.constants import evaluate_exactly
-from language.lowering.guard_slots import guard_slot
+from language.lowering.guard_variable_names import guard_slot
 from language.lowering.tick_history import rollbacks_of
 from language.lowering.wait_ticks import MAX_WAIT_TICKS, seconds_to_ticks, tunable_wait
 from language.model.automaton import Automaton, Mode, Transition

@@ -1,4 +1,4 @@
-"""Graphs of names: topological order, depth-first post-order, cycles, components, reachability.
+"""Graph algorithms: topological order, depth-first post-order, cycles, components, reachability.
 
 The algorithms are those of networkx. Its import takes longer than the check of a small spec, so a
 small graph is ordered here by the definition of the order, which takes quadratic time, and networkx

@@ -1,4 +1,4 @@
-"""Names read: the names that the expressions of an automaton read."""
+"""Used names: the names that the expressions of an automaton read."""
 
 from __future__ import annotations
 

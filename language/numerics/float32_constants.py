@@ -8,6 +8,8 @@ float32 of the domain (tests/language).
 
 from __future__ import annotations
 
+from functools import partial
+
 from language.ir.number_type import MAX_FINITE
 from language.ir.ops import Ref, add, multiply, real, subtract
 from language.numerics.exp import ExpConstants
@@ -18,7 +20,7 @@ from language.numerics.sin_cos_tanh import (
     TanhConstants,
     TrigConstants,
     count_quarter_turns,
-    horner,
+    sin_cos_kernels,
 )
 from language.numerics.tan_atan2 import Atan2Constants
 
@@ -102,26 +104,12 @@ def reduce_angle_float32(body: FunctionBuilder) -> tuple[Ref, Ref, Ref]:
     return quadrant, head, tail
 
 
-def sin_cos_kernels_float32(body: FunctionBuilder, head: Ref, tail: Ref) -> tuple[Ref, Ref]:
-    """Append the series and return the locals (sin, cos) of head + tail, |head| <= pi/4.
-
-    The method is that of `sin_cos_kernels`, with the float32 series in one piece each.
-    """
-    square = body.let("square", multiply(head, head))
-    half = body.let("half", multiply(real(0.5), square))
-    crest = body.let("crest", subtract(real(1.0), half))
-    series = body.let("sine_series", horner(SIN_SERIES, square))
-    cubic = multiply(multiply(head, square), series)
-    sine = body.let("sine", add(head, add(multiply(tail, crest), cubic)))
-    series = body.let("cosine_series", horner(COS_SERIES, square))
-    quartic = multiply(multiply(square, square), series)
-    lost = subtract(subtract(real(1.0), crest), half)
-    fringe = add(lost, subtract(quartic, multiply(head, tail)))
-    cosine = body.let("cosine", add(crest, fringe))
-    return sine, cosine
-
-
-TRIG_FLOAT32 = TrigConstants(reduce_angle_float32, sin_cos_kernels_float32, TINY_ARGUMENT, "1000")
+TRIG_FLOAT32 = TrigConstants(
+    reduce_angle_float32,
+    partial(sin_cos_kernels, sine_series=SIN_SERIES, cosine_series=COS_SERIES),
+    TINY_ARGUMENT,
+    "1000",
+)
 EXP_FLOAT32 = ExpConstants(
     EXP_LOWEST, EXP_HIGHEST, real(-126.0), PER_LN_2, LN_2, EXP_SERIES, ROUNDING_CONSTANT
 )

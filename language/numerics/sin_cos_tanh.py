@@ -221,7 +221,13 @@ def count_quarter_turns(
     return bounded, quarters, quadrant
 
 
-def sin_cos_kernels(body: FunctionBuilder, head: Ref, tail: Ref) -> tuple[Ref, Ref]:
+def sin_cos_kernels(
+    body: FunctionBuilder,
+    head: Ref,
+    tail: Ref,
+    sine_series: tuple[float, ...] = SIN_SERIES,
+    cosine_series: tuple[float, ...] = COS_SERIES,
+) -> tuple[Ref, Ref]:
     """Append the series and return the locals (sin, cos) of head + tail, |head| <= pi/4.
 
     `tail` is so small that its square is left out: it adds tail (1 - head^2/2) to sin and -head
@@ -231,17 +237,21 @@ def sin_cos_kernels(body: FunctionBuilder, head: Ref, tail: Ref) -> tuple[Ref, R
     square = body.let("square", multiply(head, head))
     half = body.let("half", multiply(real(0.5), square))
     crest = body.let("crest", subtract(real(1.0), half))
-    upper = body.let("sine_upper", horner(SIN_SERIES[3:], square))
-    series = body.let("sine_series", horner(SIN_SERIES[:3], square, upper))
-    cubic = multiply(multiply(head, square), series)
+    cubic = multiply(multiply(head, square), _let_series(body, "sine", sine_series, square))
     sine = body.let("sine", add(head, add(multiply(tail, crest), cubic)))
-    upper = body.let("cosine_upper", horner(COS_SERIES[3:], square))
-    series = body.let("cosine_series", horner(COS_SERIES[:3], square, upper))
+    series = _let_series(body, "cosine", cosine_series, square)
     quartic = multiply(multiply(square, square), series)
     lost = subtract(subtract(real(1.0), crest), half)
     fringe = add(lost, subtract(quartic, multiply(head, tail)))
     cosine = body.let("cosine", add(crest, fringe))
     return sine, cosine
+
+
+def _let_series(body: FunctionBuilder, name: str, coefficients: tuple[float, ...], x: Expr) -> Ref:
+    """Append a polynomial as locals of three lower and all upper coefficients; return the first."""
+    lower, upper = coefficients[:3], coefficients[3:]
+    rest = body.let(f"{name}_upper", horner(upper, x)) if upper else None
+    return body.let(f"{name}_series", horner(lower, x, rest))
 
 
 def select_by_quadrant(quadrant: Expr, *values: Expr) -> Expr:

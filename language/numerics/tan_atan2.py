@@ -113,14 +113,13 @@ def build_tan(constants: TrigConstants = TRIG_FLOAT64) -> Function:
     )
 
 
-def build_atan2(constants: Atan2Constants = ATAN2_FLOAT64, error_text: str = "1.5") -> Function:
+def build_atan2(constants: Atan2Constants = ATAN2_FLOAT64) -> Function:
     """Return the Function `atan2` of `rise` and `run`; its value is in (-pi, pi], 0 for (0, 0).
 
     atan t, t in [0, 1], about 0, 1/2 or 1 (Cody and Waite 1980, chapter 11); t is the smaller size
     over the larger one. atan t = atan a + atan r with r = (t - a) / (1 + t a), computed from the
     sizes: its numerator is exact (Sterbenz). The sizes are scaled down where their sum would be
     infinite. The sign of a zero counts only where the zero is the value: atan2(-0.0, 1) = -0.0.
-    `error_text` is the error in ULP for the comment.
     """
     body = FunctionBuilder()
     up, along = body.let("up", Call("abs", (RISE,))), body.let("along", Call("abs", (RUN,)))
@@ -155,7 +154,7 @@ def build_atan2(constants: Atan2Constants = ATAN2_FLOAT64, error_text: str = "1.
     flat = Select(Compare(">=", RUN, real(0.0)), RISE, size)
     half_turn = Select(Compare("<", RISE, real(0.0)), Unary("-", size), size)
     body.let("y", Select(Compare("<=", up, real(0.0)), flat, half_turn))
-    about = f"angle of (run, rise), in (-pi, pi] rad; error < {error_text} ULP"
+    about = "angle of (run, rise), in (-pi, pi] rad; error < 1.5 ULP"
     return body.build("atan2", about, ("rise", "run"))
 
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from language.expressions.name_rules import check_document_name
 from language.overlays.parameter_override import overlay_value, override_parameter
 from language.readers.base_reader import Reader
 from language.text.diagnostic import Problems, Span, suggest_name
@@ -118,6 +119,7 @@ class _CalibrationReader(Reader):
     def read(self, document: Document) -> Calibration:
         """Return the calibration of a document. Raises SpecError."""
         tree = self.read_mapping(document.root, f"calibration {document.name}", CALIBRATION_KEYS)
+        check_document_name(document.name, document.name_span, self.problems)
         of = self.read_scalar(tree.get("of"), "of", document.name_span)
         origin, date = self._read_origin_and_date(tree)
         values = {}

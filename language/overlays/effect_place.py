@@ -180,7 +180,8 @@ def _find_element(
         return PlaceMismatch(f"the {measured} of `{name}` is in `{unit}`, not in `{pattern.unit}`")
     holes.update(_element_units(pattern.of, kinds))
     holes.update(_gap_holes(tree, holes))
-    return EffectPlace(name, holes, _text_or_none(holes.get("speed")))
+    speed = holes.get("speed")
+    return EffectPlace(name, holes, speed if isinstance(speed, str) else None)
 
 
 def _element_units(of: str, kinds: Mapping[str, Dimension]) -> dict[str, Hole]:
@@ -247,11 +248,6 @@ def _multiply_dimensions(a: Dimension, b: Dimension, sign: int = 1) -> Dimension
     """Return a * b**sign with the power of the angle, which other products leave undefined."""
     powers = tuple(x + sign * y for x, y in zip(a.powers, b.powers, strict=True))
     return Dimension(powers, (a.angle or 0) + sign * (b.angle or 0))
-
-
-def _text_or_none(hole: Hole | None) -> str | None:
-    """Return a hole with a single text, or None."""
-    return hole if isinstance(hole, str) else None
 
 
 PLACE_FINDERS = {

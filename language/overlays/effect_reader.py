@@ -19,6 +19,7 @@ from language.readers.base_reader import Reader
 from language.text.diagnostic import Problems, Span, suggest_name
 from language.text.document import Document, Entry, MappingNode, ScalarNode, YamlNode, require_kind
 from language.text.expression_paths import EFFECT_SITES, KeyPath, map_formulas
+from language.text.node_edit import mapping_entries
 
 EffectLookup = Callable[[str, Span], Document]
 """Returns the document of the effect of a name; the span is where the name is written."""
@@ -167,7 +168,7 @@ def added_names(body: MappingNode) -> dict[str, Span]:
     """
     spans: dict[str, Span] = {}
     for section in ("parameters", "states", "discrete", "equations"):
-        for entry in _entries(body.get(section)):
+        for entry in mapping_entries(body.get(section)):
             if not entry.key.startswith("$"):
                 spans.setdefault(entry.key, entry.span)
     for entry in _region_equations(body.get("regions")):
@@ -198,16 +199,10 @@ def external_names(body: MappingNode) -> list[str]:
 
 def _region_equations(node: YamlNode | None) -> Iterator[Entry]:
     """Yield the equations of regions and modes, at any depth."""
-    for owner in _entries(node):
+    for owner in mapping_entries(node):
         if isinstance(owner.node, MappingNode):
-            yield from _entries(owner.node.get("equations"))
+            yield from mapping_entries(owner.node.get("equations"))
             yield from _region_equations(owner.node.get("modes"))
-
-
-def _entries(node: YamlNode | None) -> Iterator[Entry]:
-    """Yield the entries of a mapping; nothing for another node."""
-    if isinstance(node, MappingNode):
-        yield from node
 
 
 def _read_scalar_entries(reader: Reader, node: YamlNode | None, what: str) -> dict[str, Entry]:

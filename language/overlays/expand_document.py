@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
+from language.expressions.name_rules import check_document_name
 from language.overlays.apply_effect import apply_effect
 from language.overlays.calibration import (
     Calibration,
@@ -15,7 +16,7 @@ from language.overlays.calibration import (
 )
 from language.overlays.effect_reader import read_effect_application
 from language.readers.base_reader import Reader
-from language.text.diagnostic import Problems, Source, Span, SpecError
+from language.text.diagnostic import Problem, Problems, Source, Span, SpecError
 from language.text.document import Document, Entry, MappingNode, ScalarNode, SequenceNode
 from language.text.node_edit import mapping_entries
 from language.text.overlay import apply_overlay, without_keys
@@ -34,6 +35,8 @@ __all__ = [
 
 OVERLAY_KEYS = ("effects", "calibrations")
 """Keys of a document that name overlays: effects are applied first, then calibrations."""
+OTHER_NAME_RULES = ("automaton", "effect", "calibration")
+"""Kinds of documents of which the reader of the kind checks the name."""
 MAX_OVERLAYS = 20
 """Largest number of variants in a chain of `extends`."""
 
@@ -46,10 +49,16 @@ def expand_document(
     First those of the base, then each variant from the base on: its body, its effects, its
     calibrations. The result has the kind of the base and the name of the document. A document of
     any kind is accepted; one without overlays is returned unchanged. Warnings are added to
-    `problems`. Raises SpecError.
+    `problems`. Raises SpecError, also for a wrong name of a system, scenario, map, study or test,
+    or of a variant of one of them.
     """
     problems = problems or Problems()
     *variants, base = _extension_chain(document, project)
+    if base.kind not in OTHER_NAME_RULES:
+        name_problems = Problems()
+        for overlay in (base, *variants):
+            check_document_name(overlay.name, overlay.name_span, name_problems)
+        name_problems.raise_if_errors()
     expanded = _apply_effects_and_calibrations(base, base, project, problems)
     for variant in reversed(variants):
         expanded = _apply_variant_body(expanded, variant, project, problems)
@@ -295,6 +304,4 @@ def _base_name_of(document: Document) -> ScalarNode:
     node = document.root.get("extends")
     if isinstance(node, ScalarNode):
         return node
-    problems = Problems()
-    problems.error("form", document.name_span, "a variant names its base in `extends`")
-    raise SpecError(problems.reported)
+    raise SpecError([Problem("form", document.name_span, "a variant names its base in `extends`")])

@@ -38,7 +38,7 @@ def format_value_in_unit(parameter: Parameter, value: float, number_type: Number
     if parameter.type == "int":
         return str(int(value))
     number, unit = _shortest_in_any_unit(parameter, value, number_type)
-    return _format_decimal(number) if unit.text == "1" else f"{_format_decimal(number)} {unit.text}"
+    return format_decimal(number) if unit.text == "1" else f"{format_decimal(number)} {unit.text}"
 
 
 def table_points(
@@ -101,7 +101,7 @@ def format_exact(number: Fraction) -> str:
     Trailing zeros are left out. An exponent is written outside of PLAIN_EXPONENTS: `0.05`,
     `1.0e-7`.
     """
-    return _format_decimal(_round_to_digits(number, MAX_DIGITS))
+    return format_decimal(_round_to_digits(number, MAX_DIGITS))
 
 
 def format_exact_in_unit(value: Fraction, unit: Unit) -> str:
@@ -158,7 +158,7 @@ def _round_to_digits(exact: Fraction, digits: int) -> Decimal:
     return context.divide(Decimal(exact.numerator), Decimal(exact.denominator)).normalize(context)
 
 
-def _format_decimal(number: Decimal) -> str:
+def format_decimal(number: Decimal) -> str:
     """Return a decimal as a literal of the language, such as `0.05` or `1.0e-7`."""
     exponent = number.adjusted() if number else 0
     if exponent in PLAIN_EXPONENTS:

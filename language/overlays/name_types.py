@@ -1,4 +1,4 @@
-"""Tree types: the types of the names in an automaton's tree, before it is read as a model."""
+"""Name types: the types of the names in an automaton's tree, before it is read as a model."""
 
 from __future__ import annotations
 
@@ -88,9 +88,10 @@ class TreeTypes:
     def balance_dimension(self, state: str, balance: ScalarNode) -> Dimension | None:
         """Return the dimension of the left side of the balance of a state, or None if unknown.
 
-        The left side must be `der(x)` or a product of one factor and `der(x)`; `der(x)` alone has
-        the dimension of the state per second. It is None if the type of the state or the factor is
-        not known.
+        The left side must be `der(x)` or a product of one factor and `der(x)`; that x is `state` is
+        not checked. `der(x)` has the dimension of the state per second, and alone the angle of the
+        state. The result is None if the balance cannot be parsed, for another left side, if the
+        state is not real, and if the dimension of the factor is not known. Problems are discarded.
         """
         try:
             left, _ = parse_balance(balance)

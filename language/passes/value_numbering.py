@@ -31,7 +31,7 @@ class ValueNumbering:
             case Ref(name) if name in self.number_by_name:
                 return self.number_by_name[name]
             case Value(value):
-                label = repr(value)
+                label = repr(value)  # 0.0 and -0.0, 1 and 1.0 are equal, but not the same value
             case Ref(name) | Item(name):
                 label = name, self.versions[name]
             case Call(function):

@@ -59,7 +59,7 @@ from language.lowering.continuous_delay import (
 )
 from language.lowering.continuous_edge_detection import edge_bindings, level_variables, reset_levels
 from language.lowering.expressions import NameBindings, lower_equations, variable_bindings
-from language.lowering.guard_slots import mode_bindings
+from language.lowering.guard_variable_names import mode_bindings
 from language.lowering.invariants import INVARIANTS, invariant_blocks, invariant_variables
 from language.lowering.linearisation import LinearisationPoint
 from language.lowering.program_builder import (
@@ -144,7 +144,7 @@ def lower_continuous_automaton(
     }
     blocks["step"] = major_step_block(field, bool(histories), blocks)
     problems.raise_if_errors()
-    variables = [*_variables(automaton, field), *major_step_variables(field, waits)]
+    variables = [*_variables(automaton, field), *major_step_variables(waits)]
     variables += continuous_step_variables(field, method)
     variables += [Variable(name, "real") for name in _parabola_variables(varying_inputs)]
     variables += continuous_delay_variables(histories)

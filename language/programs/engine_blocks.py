@@ -34,7 +34,7 @@ from language.lowering.continuous_delay import (
 )
 from language.lowering.continuous_edge_detection import reset_levels, store_levels
 from language.lowering.expressions import NameBindings, equation_bindings
-from language.lowering.guard_slots import guard_slots
+from language.lowering.guard_variable_names import guard_slots
 from language.lowering.program_builder import clear_fired, enter_initial_modes, lower_initial_values
 from language.model.automaton import Automaton, Mode
 from language.programs.major_step import WaitTimers, begin_blocks, block_of_mode

@@ -161,7 +161,7 @@ def major_step_blocks(
     }
 
 
-def major_step_variables(field: VectorField, waits: WaitTimers) -> list[Variable]:
+def major_step_variables(waits: WaitTimers) -> list[Variable]:
     """Return the timers of the waits and the other variables of the blocks of a major step."""
     return [
         *(Variable(wait.timer, "real", "s", about="rest of the wait") for wait in waits),

@@ -18,7 +18,7 @@ from language.lowering.edge_detection import activation_variables
 from language.lowering.event_queue import queue_capacity
 from language.lowering.expressions import equation_bindings, variable_bindings
 from language.lowering.fault_mode import FAULT_GUARD
-from language.lowering.guard_slots import mode_bindings
+from language.lowering.guard_variable_names import mode_bindings
 from language.lowering.invariants import invariant_variables
 from language.lowering.program_builder import input_variables, region_variables, state_variables
 from language.lowering.program_parameters import constant_bindings
@@ -58,7 +58,7 @@ def sampled_variables(
     found += observer_variables(automaton)
     found += covariance_variables(automaton)
     found += input_change_variables(automaton)
-    found += sampled_delay_variables(automaton, delays)
+    found += sampled_delay_variables(delays)
     found += activation_variables(automaton)
     found += rollback_variables(automaton)
     found += region_variables(automaton, "tick")

@@ -19,7 +19,7 @@ from language.integration.vector_field import (
 from language.ir.ops import Assign, Block, Branch, Expr, Op, RunBlock, Switch, integer
 from language.lowering.action_stages import lower_stage_of_regions
 from language.lowering.expressions import choose_by_mode, lower_equations, names_read
-from language.lowering.guard_slots import guard_slot
+from language.lowering.guard_variable_names import guard_slot
 from language.model.automaton import Mode, Transition
 from language.model.declaration import Formula
 from language.model.region_queries import transitions_by_priority

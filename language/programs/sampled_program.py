@@ -305,7 +305,7 @@ class _SampledLowering:
 
     def _history_block(self) -> Block:
         """Return the operations that record delays, timers and history after the jump."""
-        delayed = record_delays_block(self.automaton, self.delays, self.bindings)
+        delayed = record_delays_block(self.delays, self.bindings)
         return (*delayed, *count_ticks(self.automaton), *record_tick_history(self.automaton))
 
     def _advance_of_mode(self, mode: Mode) -> Block:

@@ -16,6 +16,7 @@ from language.expressions.parser import parse_expression
 from language.expressions.syntax_tree import ErrorNode, Negation, NumberLiteral, SyntaxTree
 from language.expressions.units import (
     NO_UNIT,
+    SECOND,
     UNKNOWN_UNIT,
     Unit,
     UnitError,
@@ -200,6 +201,15 @@ class Reader:
             self.problems.error("number", node.span, label)
             return default
         return int(text)
+
+    def read_duration(self, node: YamlNode | None, what: str) -> Fraction:
+        """Return a time [s] that is not negative; 0 without a node. Reports other quantities."""
+        if node is None:
+            return Fraction(0)
+        value, unit = self.read_quantity(node, what, node.span, None)
+        if value < 0 or (value and not are_compatible(unit.dimension, SECOND)):
+            self.problems.error("range", node.span, f"`{what}` is a time, like `15 ms`")
+        return value
 
     def read_unit(self, node: YamlNode | None) -> Unit:
         """Return a unit; `NO_UNIT` (1) if the node is absent, an empty text or no scalar.
@@ -395,9 +405,3 @@ def _literal_value(tree: SyntaxTree) -> tuple[Fraction, Unit] | None:
             return 2 * unit.offset - value if unit.offset else -value, unit
         case _:
             return None
-
-
-def about_of(table: MappingNode) -> str:
-    """Return the text of `about`; "" if it is absent or no scalar."""
-    node = table.get("about")
-    return node.text if isinstance(node, ScalarNode) else ""

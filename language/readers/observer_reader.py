@@ -59,9 +59,7 @@ def read_observer(reader: Reader, node: YamlNode, key: str, model: Automaton | N
     _check_required_keys(reader, table, node.span)
     if gain == "steady":
         _reject_covariance_keys(reader, table, kalman, runs)
-    instants = _read_unknown_instants(
-        reader, table.get("unknown_instant"), f"{key}.unknown_instant"
-    )
+    instants = reader.read_formulas(table.get("unknown_instant"), f"{key}.unknown_instant")
     states = tuple(item.text for item in reader.read_list(kalman.get("states"), "states"))
     measures = _read_measures(reader, table.get("measures"), f"{key}.measures")
     of_node = table.get("of")
@@ -155,16 +153,6 @@ def _reject_covariance_keys(
     if runs:
         label = "`predict: runs` needs `gain: recursive`: the run's mode changes the covariance"
         reader.problems.error("observer", table.entries["predict"].span, label)
-
-
-def _read_unknown_instants(reader: Reader, node: YamlNode | None, key: str) -> dict[str, Formula]:
-    """Return the time by input within which its new value was sampled: `{T_em: 10 ms}`."""
-    times = {}
-    for entry in reader.named_entries(node, key):
-        formula = reader.read_expression(entry.node, f"{key}.{entry.key}", entry.span)
-        if formula:
-            times[entry.key] = formula
-    return times
 
 
 def _read_variance_limits(

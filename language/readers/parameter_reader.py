@@ -7,7 +7,7 @@ from typing import Literal, cast
 
 from language.expressions.units import NO_UNIT, UNKNOWN_UNIT, Unit, parse_unit
 from language.model.declaration import Fitting, Formula, Parameter, ParameterKind, Range
-from language.readers.base_reader import Reader, about_of
+from language.readers.base_reader import Reader
 from language.readers.lookup_table_reader import LookupTableReader, section_of
 from language.text.diagnostic import Problems
 from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
@@ -81,7 +81,7 @@ class ParameterReader(Reader):
             limits = self.check_integer_range(limits, table.get("range"))
         fitting = self._read_fitting(table, unit, limits)
         common = (entry.key, kind, unit, value, derived, limits, key, entry.span)
-        return Parameter(*common, fitting, type_, values, about=about_of(table))
+        return Parameter(*common, fitting, type_, values, about=table.text_of("about"))
 
     def _read_derived(self, table: MappingNode, key: str, entry: Entry) -> Formula | None:
         """Return the expression of a derived parameter, or None if it is missing.
@@ -119,7 +119,7 @@ class ParameterReader(Reader):
             key,
             entry.span,
             table=lookup_table,
-            about=about_of(body),
+            about=body.text_of("about"),
         )
 
     def _read_fitting(self, table: MappingNode, unit: Unit, value_range: Range | None) -> Fitting:

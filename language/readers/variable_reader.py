@@ -10,7 +10,7 @@ from language.expressions.syntax_tree import ErrorNode
 from language.expressions.units import Unit
 from language.model.automaton import Automaton
 from language.model.declaration import BUILTIN_FAULTS, Formula, Input, Range, RangePolicy, State
-from language.readers.base_reader import Reader, about_of
+from language.readers.base_reader import Reader
 from language.text.diagnostic import Problems, suggest_name
 from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
 from language.typecheck.types import TypeName
@@ -73,7 +73,7 @@ class VariableReader(Reader):
             limits = self.check_integer_range(limits, table.get("range"))
         span = entry.span
         outside = self.read_range_policy(table, unit, kind, values, limits)
-        about = about_of(table)
+        about = table.text_of("about")
         return Input(entry.key, unit, kind, default, limits, key, span, values, outside, about)
 
     def read_states(self, node: YamlNode | None) -> dict[str, State]:
@@ -105,7 +105,7 @@ class VariableReader(Reader):
                 key,
                 entry.span,
                 range_policy=outside,
-                about=about_of(table),
+                about=table.text_of("about"),
             )
         return states
 
@@ -137,7 +137,7 @@ class VariableReader(Reader):
                     kind,
                     values,
                     self.read_range_policy(table, unit, kind, values, limits),
-                    about_of(table),
+                    table.text_of("about"),
                 )
         return variables
 

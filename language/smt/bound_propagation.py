@@ -1,4 +1,4 @@
-"""Linear bounds: disproves conjunctions of linear relations exactly, without a solver.
+"""Bound propagation: disproves conjunctions of linear relations exactly, without a solver.
 
 Each relation between linear expressions bounds the value along a direction: `2 * x - v > 1` and `v
 >= 2 * x` bound the same direction from below and from above. An empty interval, or an infeasible

@@ -84,9 +84,12 @@ def _boundary_points(
 def neighbouring_points(point: Valuation, query: SolverQuery) -> Iterator[Valuation]:
     """Yield a point of z3, its floating-point neighbours, and copies with one sampled coordinate.
 
-    The order is: the point with the defaults of the domains, the point itself, each float
-    coordinate moved down and up by one float, then `SAMPLE_COUNT - 1` sampled values of each
-    coordinate. Neighbours are tried because the solution of z3 is rounded.
+    The order is: the point with the defaults of the domains, the point itself, the points with one
+    float coordinate moved down and up by one float, then those with one sampled coordinate: for
+    each of `SAMPLE_COUNT - 1` indices each coordinate in turn. A sampled coordinate with a default
+    is its default. Points may repeat, and neighbours may lie outside the domains; whether the query
+    holds is not checked. Neighbours are tried because the solution of z3 is rounded. KeyError for a
+    name without a domain.
     """
     default = {
         name: domain.default

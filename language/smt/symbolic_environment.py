@@ -1,4 +1,4 @@
-"""Guard snapshot: binds names to symbolic values at one instant in one mode.
+"""Symbolic environment: binds names to symbolic values at one instant in one mode.
 
 Expressions are lowered as for a Program. The equations that an expression reads become assignments
 before it. An equation of a parallel region is selected by the mode of that region, which is a
@@ -111,8 +111,10 @@ class GuardSnapshot:
     def in_enclosing_mode(self, outer: Mode) -> GuardSnapshot:
         """Return a copy of the snapshot for a mode that encloses this one; both share the path.
 
-        The time in the enclosing mode is a new variable in ticks that is not below the time in this
-        mode. Equations are still those of this mode.
+        Only the time in the mode differs: it is a new variable, `after(...)` is bound anew, and the
+        mode, its equations and all other values are still those of this mode. The path, and with it
+        this snapshot, gets the domains of both times, ticks of at least 0, and the assumption that
+        the time in the enclosing mode is not below that in this mode.
         """
         result = copy.copy(self)
         result.bindings = {
@@ -226,7 +228,7 @@ class GuardSnapshot:
         """
         trees = list(trees)
         needed: dict[str, list[tuple[int | None, str, Formula]]] = {}
-        stack = [name for tree in trees for name in _names_read(tree)]
+        stack = [name for tree in trees for name in Formula(tree, "").reads]
         while stack:
             name = stack.pop()
             if name in needed or name in self.bindings:
@@ -303,7 +305,7 @@ class GuardSnapshot:
             return Value(False)  # there is no earlier instant in this activation
         if call.function == "after":
             if self.suffix:
-                return Value(_after_seconds(automaton, call) <= 0)
+                return Value(evaluate_exactly(Formula(call.arguments[0], ""), automaton) <= 0)
             if automaton.is_sampled:
                 return self._is_in_mode_for(call)
             self.path.domains[TIME_IN_MODE] = VariableDomain(low=Fraction(0))
@@ -363,16 +365,6 @@ def _mode_activity(chart: Chart) -> dict[str, tuple[ChartNode, Expr]]:
     """Return the nodes of a chart by mode path, each with the condition that it is active."""
     paths = mode_paths(chart).items()
     return {path: (node, is_active(chart, node, "mode")) for path, node in paths}
-
-
-def _after_seconds(automaton: Automaton, call: FunctionCall) -> Fraction:
-    """Return the exact time of an `after` call [s]."""
-    return evaluate_exactly(Formula(call.arguments[0], ""), automaton)
-
-
-def _names_read(tree: SyntaxTree) -> list[str]:
-    """Return the names that an expression reads."""
-    return list(Formula(tree, "").reads)
 
 
 def _run_mode_bindings(model: Automaton, domains: dict[str, VariableDomain]) -> dict[str, Expr]:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from language.text.diagnostic import Problems, Source, Span, SpecError
+from language.text.diagnostic import Problem, Problems, Source, Span, SpecError
 
 MAX_BYTES = 4 * 1024 * 1024
 """Largest file that is read [bytes]; a spec written by hand has a few kB."""
@@ -71,6 +71,11 @@ class MappingNode:
         entry = self.entries.get(key)
         return entry.node if entry else None
 
+    def text_of(self, key: str) -> str:
+        """Return the text of a key; "" if it is absent or no scalar."""
+        node = self.get(key)
+        return node.text if isinstance(node, ScalarNode) else ""
+
     def __iter__(self) -> Iterator[Entry]:
         """Iterate over the entries in the order of the file."""
         return iter(self.entries.values())
@@ -122,38 +127,50 @@ def read_text(path: Path, display_name: str | None = None) -> tuple[Source, str]
     UTF-8.
     """
     name = display_name or str(path)
-    place = Span(Source(name), 1, 1)
-    problems = Problems()
-    try:
-        status = path.stat()
-        size = status.st_size
-        if not stat.S_ISREG(status.st_mode):
-            label = "the file cannot be read: it is a folder, a pipe or a device"
-            problems.error("unreadable", place, label)
-        problems.raise_if_errors()
-        data = path.read_bytes() if size <= MAX_BYTES else b""
-    except OSError as error:
-        problems.error("unreadable", place, f"the file cannot be read: {error.strerror}")
-        raise SpecError(problems.reported) from None
-    except ValueError:
-        problems.error("unreadable", place, "this is not the name of a file")
-        raise SpecError(problems.reported) from None
-    if size > MAX_BYTES:
-        problems.error("huge", place, f"the file has {size} bytes; a spec has at most {MAX_BYTES}")
-        raise SpecError(problems.reported)
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        place = Span(Source(name), line, 1)
-        problems.error("binary", place, "this is not UTF-8 text", "save it as UTF-8")
-        raise SpecError(problems.reported) from None
+    text = decode_utf8(read_regular_file(path, name, MAX_BYTES, "a spec"), name)
     return Source(name, lines_of(text)), text
 
 
-def lines_of(text: str) -> tuple[str, ...]:
-    r"""Return the lines of a text as YAML counts them (LINE_END), without line ends.
+def read_regular_file(path: Path, name: str, max_bytes: int, what: str) -> bytes:
+    """Return the content of a file; `name` and `what` stand for it in messages.
 
-    One `\n` at the end of the text starts no further line. An empty text has no lines.
+    Raises SpecError with one problem at line 1: "unreadable" if the file does not exist or is not a
+    regular file, "huge" if it is larger than `max_bytes`.
     """
-    return tuple(LINE_END.split(text.removesuffix("\n"))) if text else ()
+    kind = "unreadable"
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            label = "the file cannot be read: it is a folder, a pipe or a device"
+        elif status.st_size > max_bytes:
+            kind = "huge"
+            label = f"the file has {status.st_size} bytes; {what} has at most {max_bytes}"
+        else:
+            return path.read_bytes()
+    except OSError as error:
+        label = f"the file cannot be read: {error.strerror}"
+    except ValueError:
+        label = "this is not the name of a file"
+    raise SpecError([Problem(kind, Span(Source(name), 1, 1), label)])
+
+
+def decode_utf8(data: bytes, name: str) -> str:
+    """Return the text of UTF-8 without a byte order mark.
+
+    Raises SpecError, "binary" at the first line that is not UTF-8.
+    """
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        place = Span(Source(name), data.count(b"\n", 0, error.start) + 1, 1)
+        label = "this is not UTF-8 text"
+        raise SpecError([Problem("binary", place, label, "save it as UTF-8")]) from None
+
+
+def lines_of(text: str) -> tuple[str, ...]:
+    """Return the lines of a text as YAML counts them (LINE_END), without line ends.
+
+    A line end at the end of the text starts no further line. An empty text has no lines.
+    """
+    *lines, last = LINE_END.split(text)
+    return (*lines, last) if last else tuple(lines)

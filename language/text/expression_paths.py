@@ -1,4 +1,4 @@
-"""Formula sites: the key paths of expressions in the tree of an automaton or an effect."""
+"""Expression paths: the key paths of expressions in the tree of an automaton or an effect."""
 
 from __future__ import annotations
 

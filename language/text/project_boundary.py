@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 
-from language.text.diagnostic import Problems, Span, SpecError
+from language.text.diagnostic import Problem, Source, Span, SpecError
 
 ALLOW_OUTSIDE_ENV = "MODEWRIGHT_ALLOW_OUTSIDE"
 """Environment variable that allows files outside of the project; `--allow-outside` sets it."""
@@ -47,15 +48,38 @@ def require_inside_project(path: Path, span: Span, root: Path) -> None:
     named_in = Path(span.source.name)
     if os.environ.get(ALLOW_OUTSIDE_ENV) or not path_exists(path) or not path_exists(named_in):
         return
-    roots = [root, project_root_of(named_in), Path(str(resources.files("spec")))]
-    if os.environ.get(RECORDINGS_ENV):
-        roots.append(Path(os.environ[RECORDINGS_ENV]))
-    resolved = path.resolve()
-    if any(resolved.is_relative_to(allowed.resolve()) for allowed in roots):
+    if not _is_below(path, [root, project_root_of(named_in)]):
+        raise _outside_error(span, project_root_of(named_in))
+
+
+def require_link_inside_project(path: Path, name: str) -> None:
+    """Raise SpecError for a file of a project that a symbolic link places outside of it.
+
+    The project is the nearest folder above the link that contains a folder `spec`; without one, or
+    without a link, there is no check. `name` is the name of the file in the message. Allowed are
+    the targets that `require_inside_project` allows, and files below the working folder.
+    """
+    if os.environ.get(ALLOW_OUTSIDE_ENV) or not path_exists(path):
         return
-    problems = Problems()
-    label = "this file is outside of the project"
-    hint = f"its root is {project_root_of(named_in)}; "
-    hint += "`modewright --allow-outside ...` reads the file nevertheless"
-    problems.error("outside", span, label, hint)
-    raise SpecError(problems.reported)
+    link = Path(os.path.abspath(path))
+    root = next((parent for parent in link.parents if (parent / "spec").is_dir()), None)
+    if root and link != link.resolve() and not _is_below(link, [root, Path()]):
+        raise _outside_error(Span(Source(name), 1, 1), root)
+
+
+def _is_below(path: Path, roots: Sequence[Path]) -> bool:
+    """Return whether a file is below a root, with the specs of the distribution and recordings.
+
+    Symbolic links are resolved.
+    """
+    allowed = [*roots, Path(str(resources.files("spec")))]
+    if os.environ.get(RECORDINGS_ENV):
+        allowed.append(Path(os.environ[RECORDINGS_ENV]))
+    resolved = path.resolve()
+    return any(resolved.is_relative_to(folder.resolve()) for folder in allowed)
+
+
+def _outside_error(span: Span, root: Path) -> SpecError:
+    """Return the error of a file outside of a project, named at `span`."""
+    hint = f"its root is {root}; `modewright --allow-outside ...` reads the file nevertheless"
+    return SpecError([Problem("outside", span, "this file is outside of the project", hint)])

@@ -12,7 +12,11 @@ from pathlib import Path
 
 from language.text.diagnostic import Problems, Source, Span, SpecError, suggest_name
 from language.text.document import Document, MappingNode, ScalarNode, lines_of, read_text
-from language.text.project_boundary import path_exists, require_inside_project
+from language.text.project_boundary import (
+    path_exists,
+    require_inside_project,
+    require_link_inside_project,
+)
 from language.text.yaml_parser import parse_yaml
 
 DOCUMENT_KINDS = (
@@ -156,8 +160,10 @@ def display_path(path: Path) -> str:
 def read_document(path: Path) -> Document:
     """Return the document of a file; its source is named by `display_path`.
 
-    Raises SpecError as `read_text`, `parse_yaml` and `parse_document`.
+    Raises SpecError as `require_link_inside_project`, `read_text`, `parse_yaml` and
+    `parse_document`.
     """
+    require_link_inside_project(path, display_path(path))
     source, text = read_text(path, display_path(path))
     return parse_document(source, text)
 

@@ -1,4 +1,4 @@
-"""Typing context: the interface of the type checker for the functions that type calls."""
+"""Checker protocol: the interface of the type checker for the functions that type calls."""
 
 from __future__ import annotations
 

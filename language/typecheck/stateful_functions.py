@@ -1,4 +1,5 @@
-"""Memory calls: types of functions with memory and of `lookup`, and where they are allowed."""
+"""Stateful functions: types of functions with memory and of `lookup`, and where they are
+allowed."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -24,6 +24,15 @@ from language.overlays.literal_format import (
     format_calibration,
     format_value_in_unit,
     has_exact_literal,
+)
+from language.text.arguments import (
+    PathText,
+    PathTexts,
+    optional,
+    to_choice,
+    to_path,
+    to_project,
+    to_text,
 )
 from language.text.diagnostic import Problem, Problems, Source, Span
 from language.text.document import Document, ScalarNode, YamlNode
@@ -51,12 +60,13 @@ class CalibrationPage:
     def text(self, form: str) -> str:
         """Return the page as the text of a file in the format `dcm`, `cdfx` or `csv`.
 
-        The heading names automaton and number type; the text has no date. Raises KeyError for
+        The heading names automaton and number type; the text has no date. Raises ValueError for
         another format.
         """
+        known = to_choice(form, FORMATS, "form")
         name, number = self.program.name, self.program.number_type
         heading = (f"calibration page of {name}, {number}, SI units", "written by modewright")
-        return FORMATS[form].write(
+        return FORMATS[known].write(
             name, heading, page_characteristics(self.automaton, self.program)
         )
 
@@ -113,26 +123,25 @@ class ResolvedPage:
 
 
 def export_calibration(
-    reference: str,
+    reference: PathText,
     values: Values | None = None,
-    root: Path | None = None,
-    calibrations: Sequence[str] = (),
+    root: PathText | None = None,
+    calibrations: PathTexts = (),
 ) -> CalibrationPage:
     """Return the calibration page of an automaton, with calibrations, then `values`, applied.
 
     Solved numbers are computed for the parameter values as the number type of the automaton stores
     them. Writes no file. Raises SpecError.
     """
-    project = Project(root or Path())
-    return _build_page(
-        load_calibrated_document(reference, project, calibrations), project, parse_values(values)
-    )
+    project, scalars = to_project(root), parse_values(values)
+    name = to_text(reference, "reference")
+    return _build_page(load_calibrated_document(name, project, calibrations), project, scalars)
 
 
 def import_calibration(
-    file: Path,
-    of: str,
-    root: Path | None = None,
+    file: PathText,
+    of: PathText,
+    root: PathText | None = None,
     form: str | None = None,
     own_only: bool = False,
 ) -> ImportedPage:
@@ -141,20 +150,19 @@ def import_calibration(
     `form` is `dcm`, `cdfx` or `csv`; None takes it from the suffix. Parameters that are not in the
     file keep the value of the spec and get a remark. With `own_only` names that do not begin with
     the name of the automaton and a dot are ignored, each with a remark; else an unknown name is an
-    error. Raises SpecError.
+    error. Raises SpecError, and ValueError for another `form`.
     """
-    project = Project(root or Path())
-    return _import_page(
-        file, form, load_calibrated_document(of, project, ()), project, {}, own_only
-    )
+    project, path, known = to_project(root), to_path(file, "file"), _format_of(form)
+    document = load_calibrated_document(to_text(of, "of"), project, ())
+    return _import_page(path, known, document, project, {}, own_only)
 
 
 def resolve_calibration(
-    reference: str,
-    page: Path | None = None,
+    reference: PathText,
+    page: PathText | None = None,
     values: Values | None = None,
-    root: Path | None = None,
-    calibrations: Sequence[str] = (),
+    root: PathText | None = None,
+    calibrations: PathTexts = (),
     form: str | None = None,
 ) -> ResolvedPage:
     """Return the page of an automaton with solved numbers computed again.
@@ -162,23 +170,28 @@ def resolve_calibration(
     With the file `page` the parameter values are those of the file, and changes are relative to its
     solved numbers. Without it they are those of `calibrations` and `values`, and changes are
     relative to the spec without both. A solved number that is not in the file or in the spec is in
-    `added`. `form` is the format of the file. Raises SpecError.
+    `added`. `form` is the format of the file. Raises SpecError, and ValueError for another `form`.
     """
-    project = Project(root or Path())
-    document = load_calibrated_document(reference, project, calibrations)
-    scalars = parse_values(values)
-    if page:
-        imported = _import_page(page, form, document, project, scalars)
+    project, scalars, name = to_project(root), parse_values(values), to_text(reference, "reference")
+    path, known = optional(to_path, page, "page"), _format_of(form)
+    document = load_calibrated_document(name, project, calibrations)
+    if path:
+        imported = _import_page(path, known, document, project, scalars)
         absent = [remark.name for remark in imported.remarks if remark.kind == "missing"]
         solved = {page_name(imported.page.program, c) for c in imported.page.solved}
         added = tuple(name for name in absent if name in solved)
         remarks = tuple(remark for remark in imported.remarks if remark.name not in added)
         return ResolvedPage(imported.page, imported.stale, added, remarks, imported.warnings)
-    before = _build_page(load_calibrated_document(reference, project, ()), project, {})
+    before = _build_page(load_calibrated_document(name, project, ()), project, {})
     after = _build_page(document, project, scalars)
-    known = {constant.name: constant.value for constant in before.solved}
-    added = tuple(page_name(after.program, c) for c in after.solved if c.name not in known)
-    return ResolvedPage(after, _changed_constants(known, after), added)
+    old = {constant.name: constant.value for constant in before.solved}
+    added = tuple(page_name(after.program, c) for c in after.solved if c.name not in old)
+    return ResolvedPage(after, _changed_constants(old, after), added)
+
+
+def _format_of(form: str | None) -> str | None:
+    """Return the name of a format; None for None. Raises ValueError, which names the formats."""
+    return None if form is None else to_choice(form, FORMATS, "form")
 
 
 def _import_page(

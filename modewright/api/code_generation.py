@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterator
+from typing import get_args
 
 from codegen.coverage.boundary_values import generate_boundary_sequences
 from codegen.coverage.coverage_exploration import corpus_records, generate_corpus
@@ -27,11 +27,26 @@ from language.loading.system_reader import with_number_type
 from language.lowering.range_saturation import require_ranges
 from language.model.automaton import Automaton
 from language.model.declaration import Input, State
-from language.overlays.expand_document import Project
+from language.text.arguments import (
+    PathText,
+    PathTexts,
+    optional,
+    to_choice,
+    to_count,
+    to_path,
+    to_project,
+    to_some_texts,
+    to_text,
+)
 from lockstep.comparison import MAX_COUNTED_STEPS
 from lockstep.fuzzing import RUNS, SEED, TICKS, FuzzReport, fuzz as fuzzed
 from lockstep.tick_log import TickLog, record_ticks
-from modewright.api.documents import Values, load_calibrated_document, parse_values
+from modewright.api.documents import (
+    Values,
+    load_calibrated_document,
+    number_type_of,
+    parse_values,
+)
 from modewright.api.simulation import load
 from modewright.api.spec_tests import find_tests, load_tests
 
@@ -42,10 +57,10 @@ SEEDS = (SEED, SEED + 1)
 
 
 def generate(
-    reference: str,
+    reference: PathText,
     values: Values | None = None,
-    root: Path | None = None,
-    calibrations: Sequence[str] = (),
+    root: PathText | None = None,
+    calibrations: PathTexts = (),
 ) -> dict[str, str]:
     """Return the texts of the C files of an automaton by file name.
 
@@ -56,10 +71,10 @@ def generate(
 
 
 def cmake(
-    reference: str,
+    reference: PathText,
     values: Values | None = None,
-    root: Path | None = None,
-    calibrations: Sequence[str] = (),
+    root: PathText | None = None,
+    calibrations: PathTexts = (),
 ) -> dict[str, str]:
     """Return the CMake file for the C of an automaton, as a dict of one text by file name.
 
@@ -70,11 +85,11 @@ def cmake(
 
 
 def fmu(
-    reference: str,
+    reference: PathText,
     version: Version = 3,
     values: Values | None = None,
-    root: Path | None = None,
-    calibrations: Sequence[str] = (),
+    root: PathText | None = None,
+    calibrations: PathTexts = (),
     *,
     is_source_only: bool = False,
 ) -> bytes:
@@ -83,17 +98,18 @@ def fmu(
     With `is_source_only` the FMU has no binary. Raises SpecError, ValueError for another version or
     an automaton without C, and MissingToolError and BuildError if the binary cannot be built.
     """
-    return build_fmu(_load_program(reference, values, root, calibrations), version, is_source_only)
+    known = to_choice(version, get_args(Version), "version")
+    return build_fmu(_load_program(reference, values, root, calibrations), known, is_source_only)
 
 
 def a2l(
-    reference: str,
-    elf: Path | None = None,
+    reference: PathText,
+    elf: PathText | None = None,
     page: str | None = None,
     instance: str | None = None,
     values: Values | None = None,
-    root: Path | None = None,
-    calibrations: Sequence[str] = (),
+    root: PathText | None = None,
+    calibrations: PathTexts = (),
 ) -> str:
     """Return the text of the A2L file of an automaton's C.
 
@@ -101,16 +117,19 @@ def a2l(
     the calibration structure and of the instance, required if the program has several candidates.
     They are ignored without `elf`. Raises SpecError, ImageError and MissingToolError.
     """
+    path, page = optional(to_path, elf, "elf"), optional(to_text, page, "page")
+    instance = optional(to_text, instance, "instance")
     program = _load_program(reference, values, root, calibrations)
-    return asam.emit_a2l(program, asam.locate_module(program, elf, page, instance) if elf else None)
+    module = asam.locate_module(program, path, page, instance) if path else None
+    return asam.emit_a2l(program, module)
 
 
 def dbc(
-    reference: str,
+    reference: PathText,
     first: int = FIRST_IDENTIFIER,
     values: Values | None = None,
-    root: Path | None = None,
-    calibrations: Sequence[str] = (),
+    root: PathText | None = None,
+    calibrations: PathTexts = (),
     *,
     is_fd: bool = False,
 ) -> str:
@@ -121,35 +140,37 @@ def dbc(
     signals. Raises SpecError, MissingToolError, and ValueError for an identifier that is negative
     or has more than 29 bits.
     """
+    first_identifier = to_count(first, "first")
     automaton, program = _load_automaton_and_program(reference, values, root, calibrations, None)
-    return emit_dbc(program, _input_ranges(automaton), first, is_fd)
+    return emit_dbc(program, _input_ranges(automaton), first_identifier, is_fd)
 
 
 def prove(
-    reference: str,
+    reference: PathText,
     values: Values | None = None,
-    root: Path | None = None,
-    calibrations: Sequence[str] = (),
-    checks: Sequence[str] = CHECKS,
+    root: PathText | None = None,
+    calibrations: PathTexts = (),
+    checks: PathTexts = CHECKS,
 ) -> Iterator[ToolVerdict]:
     """Yield the verdicts of external tools about the C of an automaton, one check after another.
 
     `checks` are names of CHECKS, by default all. A failed proof is a verdict and not an exception.
-    Raises SpecError, BuildError, KeyError for an unknown check, and MissingToolError for a tool
-    that is not installed.
+    Raises SpecError, BuildError, ValueError for an unknown check and for no check, and
+    MissingToolError for a tool that is not installed.
     """
+    names = [to_choice(name, CHECKS, "checks") for name in to_some_texts(checks, "checks")]
     automaton, program = _load_automaton_and_program(reference, values, root, calibrations, None)
-    yield from run_checks(automaton, program, checks)
+    yield from run_checks(automaton, program, names)
 
 
 def fuzz(
-    reference: str,
+    reference: PathText,
     runs: int = RUNS,
     ticks: int = TICKS,
     seed: int = SEED,
     values: Values | None = None,
-    root: Path | None = None,
-    calibrations: Sequence[str] = (),
+    root: PathText | None = None,
+    calibrations: PathTexts = (),
     numbers: NumberType | None = None,
 ) -> FuzzReport:
     """Compare engine and C of a sampled automaton on sequences that libFuzzer generates.
@@ -159,6 +180,8 @@ def fuzz(
     continuous automaton, MissingToolError and BuildError; a difference is in the report and is not
     raised.
     """
+    runs, ticks = to_count(runs, "runs", 1), to_count(ticks, "ticks", 1)
+    seed, numbers = to_count(seed, "seed", 1), number_type_of(numbers)
     automaton, program = _load_automaton_and_program(reference, values, root, calibrations, numbers)
     if not automaton.is_sampled:
         raise ValueError(f"{automaton.name} is continuous: sequences are those of sampled automata")
@@ -166,11 +189,11 @@ def fuzz(
 
 
 def mcdc(
-    reference: str,
+    reference: PathText,
     runs: int = 0,
     values: Values | None = None,
-    root: Path | None = None,
-    calibrations: Sequence[str] = (),
+    root: PathText | None = None,
+    calibrations: PathTexts = (),
     numbers: NumberType | None = None,
     *,
     is_proven: bool = True,
@@ -184,6 +207,7 @@ def mcdc(
     MissingToolError, BuildError, and ValueError without any sequence and for `runs` of a continuous
     automaton.
     """
+    runs, numbers = to_count(runs, "runs"), number_type_of(numbers)
     automaton, program = _load_automaton_and_program(reference, values, root, calibrations, numbers)
     sequences = [tape.inputs for tape in _record_project_tests(program, root, numbers)]
     ranges = _input_ranges(automaton)
@@ -215,7 +239,7 @@ def _retained_ranges(automaton: Automaton, program: Program) -> dict[str, tuple[
 
 
 def _record_project_tests(
-    program: Program, root: Path | None, numbers: NumberType | None
+    program: Program, root: PathText | None, numbers: NumberType | None
 ) -> Iterator[TickLog]:
     """Yield the tick logs of a Program in the tests of a project."""
     for test in load_tests(find_tests(root), root):
@@ -226,10 +250,10 @@ def _record_project_tests(
 
 
 def metrics(
-    reference: str,
+    reference: PathText,
     values: Values | None = None,
-    root: Path | None = None,
-    calibrations: Sequence[str] = (),
+    root: PathText | None = None,
+    calibrations: PathTexts = (),
     numbers: NumberType | None = None,
 ) -> Metrics:
     """Return ROM, RAM and stack of the C of an automaton on a Cortex-M4F.
@@ -240,12 +264,12 @@ def metrics(
 
 
 def instructions(
-    reference: str,
-    system: str,
-    scenario: str,
+    reference: PathText,
+    system: PathText,
+    scenario: PathText,
     values: Values | None = None,
-    root: Path | None = None,
-    calibrations: Sequence[str] = (),
+    root: PathText | None = None,
+    calibrations: PathTexts = (),
     numbers: NumberType | None = None,
 ) -> InstructionCounts:
     """Return the instruction counts of the steps of an automaton's C in a scenario of a system.
@@ -254,6 +278,7 @@ def instructions(
     MAX_COUNTED_STEPS steps. `calibrations` apply to automaton and system, `values` to the automaton
     only. Raises SpecError, MissingToolError, and ValueError if the system has no such instance.
     """
+    numbers = number_type_of(numbers)
     program = _load_program(reference, values, root, calibrations, numbers)
     loaded = load(system, scenario, None, root, calibrations)
     run = with_number_type(loaded.system, numbers) if numbers else loaded.system
@@ -271,10 +296,10 @@ def _input_ranges(automaton: Automaton) -> dict[str, tuple[float, float]]:
 
 
 def _load_program(
-    reference: str,
+    reference: PathText,
     values: Values | None,
-    root: Path | None,
-    calibrations: Sequence[str],
+    root: PathText | None,
+    calibrations: PathTexts,
     numbers: NumberType | None = None,
 ) -> Program:
     """Return the Program of an automaton."""
@@ -282,21 +307,23 @@ def _load_program(
 
 
 def _load_automaton_and_program(
-    reference: str,
+    reference: PathText,
     values: Values | None,
-    root: Path | None,
-    calibrations: Sequence[str],
+    root: PathText | None,
+    calibrations: PathTexts,
     numbers: NumberType | None,
 ) -> tuple[Automaton, Program]:
     """Return an automaton and its Program, with calibrations, values and number type applied.
 
-    Raises SpecError, also for a sampled automaton with missing ranges.
+    Raises SpecError, also for a sampled automaton with missing ranges, and ValueError for another
+    number type.
     """
-    project = Project(root or Path())
-    document = load_calibrated_document(reference, project, calibrations)
-    automaton = automaton_of(document, project, parse_values(values))
-    if numbers:
-        automaton = dataclasses.replace(automaton, numbers=numbers)
+    project, scalars, number_type = to_project(root), parse_values(values), number_type_of(numbers)
+    name = to_text(reference, "reference")
+    document = load_calibrated_document(name, project, calibrations)
+    automaton = automaton_of(document, project, scalars)
+    if number_type:
+        automaton = dataclasses.replace(automaton, numbers=number_type)
     if automaton.is_sampled:
         require_ranges(automaton)
     return automaton, program_of(automaton)

@@ -36,6 +36,18 @@ from language.loading.load import automaton_of
 from language.model.automaton import Automaton
 from language.overlays.effect_reader import Effect
 from language.overlays.expand_document import Project, display_path, expand_document, read_document
+from language.text.arguments import (
+    PathText,
+    PathTexts,
+    optional,
+    require_instance,
+    to_non_negative,
+    to_path,
+    to_project,
+    to_some_texts,
+    to_text,
+    to_texts,
+)
 from modewright.api.recordings import CheckedRecordings, check_recordings, held_out_findings
 from modewright.runtime.blas_threads import SingleThreadedBlas
 from modewright.runtime.gc_threshold import infrequent_gc
@@ -91,15 +103,15 @@ class _Budget:
 @SingleThreadedBlas()
 @infrequent_gc()
 def diagnose(
-    spec: str,
-    train: Sequence[str | Path],
-    held_out: Sequence[str | Path] = (),
-    map: str | None = None,
-    effects: str | Path | None = None,
-    root: Path | None = None,
+    spec: PathText,
+    train: PathTexts,
+    held_out: PathTexts = (),
+    map: PathText | None = None,
+    effects: PathText | None = None,
+    root: PathText | None = None,
     *,
-    thresholds: str | Path = CACHED,
-    out: str | Path | None = None,
+    thresholds: PathText = CACHED,
+    out: PathText | None = None,
     budget: float | None = None,
     anyway: bool = False,
     tell: Report = lambda text: None,
@@ -107,23 +119,27 @@ def diagnose(
     """Find the effects that an automaton lacks to reproduce recordings.
 
     `train` are the recordings to explain, `held_out` those for the validation only; a recording
-    that is named twice or in both raises ValueError. `map` is the map of recordings (default: that
-    of the spec). `effects` is a folder of effects instead of those of the project and of the
-    library. `thresholds` are `kept` (of an earlier bootstrap, else the defaults), `bootstrap`
-    (computed if there are none), `usual` (the defaults) or a file.
+    that is named twice or in both raises ValueError, and so does an empty `train`. `map` is the map
+    of recordings (default: that of the spec). `effects` is a folder of effects instead of those of
+    the project and of the library. `thresholds` are `kept` (of an earlier bootstrap, else the
+    defaults), `bootstrap` (computed if there are none), `usual` (the defaults) or a file.
 
     Recordings with errors are left out, unless `anyway`; if none remains, or after `budget` seconds
     without a verdict, the verdict is `unknown`. With `out` the results are written there as by
     `save_diagnosis`, and an interrupted diagnosis continues from its checkpoints. `tell` is called
     with lines of progress. Raises SpecError, ValueError, MissingToolError and OutputError.
     """
-    time_budget = _Budget(budget, tell)
+    spec, project = to_text(spec, "spec"), to_project(root)
+    files, held_out_files = to_some_texts(train, "train"), to_texts(held_out, "held_out")
+    folder, effect_folder = optional(to_path, out, "out"), optional(to_path, effects, "effects")
+    time_budget = _Budget(optional(to_non_negative, budget, "budget"), tell)
     tell = time_budget.report
-    require_disjoint(train, held_out)
-    bootstrap, limits = _read_thresholds(thresholds)
-    checked = check_recordings(train, map, spec, root=root)
-    case, automaton = _build_case(spec, train, held_out, checked, effects, root)
-    stages = _checkpoint_folder(out)
+    map_name, threshold_text = optional(to_text, map, "map"), to_text(thresholds, "thresholds")
+    require_disjoint(files, held_out_files)
+    bootstrap, limits = _read_thresholds(threshold_text)
+    checked = check_recordings(files, map_name, spec, root=root)
+    case, automaton = _build_case(spec, files, held_out_files, checked, effect_folder, project)
+    stages = _checkpoint_folder(folder)
     case = dataclasses.replace(
         case,
         thresholds=limits,
@@ -136,7 +152,7 @@ def diagnose(
     left_out = tuple(case.name_of(file) for file in case.train if file not in usable_files)
     if usable_files:
         reasons = [f"left out: {text}" for text in errors]
-        if effects is not None:
+        if effect_folder is not None:
             reasons += explain_unplaceable(case.effects or (), case.document, case.project)
         for text in reasons:
             tell(text)
@@ -144,8 +160,8 @@ def diagnose(
         report = _conclude(case, automaton, checked, left_out, reasons, time_budget)
     else:
         report = _report_unusable(case, automaton, checked, errors, time_budget)
-    if out is not None:
-        save_diagnosis(report, out, spec)
+    if folder is not None:
+        save_diagnosis(report, folder, spec)
     return report
 
 
@@ -162,11 +178,11 @@ def _report_unusable(
     return DiagnosisReport(case, automaton, checked.check, verdict)
 
 
-def _checkpoint_folder(out: str | Path | None) -> Path | None:
+def _checkpoint_folder(out: Path | None) -> Path | None:
     """Return the folder of checkpoints; None without `out`. Raises OutputError if it is a file."""
     if out is None:
         return None
-    folder = Path(out) / CHECKPOINT_FOLDER
+    folder = out / CHECKPOINT_FOLDER
     if os.path.lexists(folder) and not folder.is_dir():
         raise OutputError(f"{folder}: this is a file; the folder of checkpoints has this name")
     return folder
@@ -214,7 +230,7 @@ def _conclude(
     return dataclasses.replace(dossier, verdict=verdict)
 
 
-def save_diagnosis(report: DiagnosisReport, out: str | Path, spec: str) -> list[Path]:
+def save_diagnosis(report: DiagnosisReport, out: PathText, spec: PathText) -> list[Path]:
     """Write verdict, variant, report and figures into a folder and return the paths.
 
     The folder is created if necessary; `thresholds.json` is written unless the thresholds are the
@@ -224,9 +240,10 @@ def save_diagnosis(report: DiagnosisReport, out: str | Path, spec: str) -> list[
     """
     from diagnosis.report.report_files import report_files
 
-    folder = Path(out)
+    folder, base = to_path(out, "out"), to_text(spec, "spec")
+    require_instance(report, DiagnosisReport, "report")
     make_folder(folder)
-    variant = format_variant(report, base_reference(report, spec, folder))
+    variant = format_variant(report, base_reference(report, base, folder))
     files = {}
     if report.case.thresholds != DEFAULT_THRESHOLDS:
         files[folder / "thresholds.json"] = format_thresholds(report.case.thresholds).encode()
@@ -266,14 +283,13 @@ def base_reference(report: DiagnosisReport, spec: str, folder: Path) -> str:
 
 def _build_case(
     spec: str,
-    train: Sequence[str | Path],
-    held_out: Sequence[str | Path],
+    train: Sequence[str],
+    held_out: Sequence[str],
     checked: CheckedRecordings,
-    effects: str | Path | None,
-    root: Path | None,
+    effects: Path | None,
+    project: Project,
 ) -> tuple[Case, Automaton]:
     """Return the case of a diagnosis and its automaton."""
-    project = Project(root or Path())
     document = read_document(project.path_of(spec))
     automaton = checked.automaton or automaton_of(document, project)
     expanded_document = expand_document(document, project)
@@ -295,31 +311,31 @@ def _build_case(
     return case, automaton
 
 
-def _read_thresholds(thresholds: str | Path) -> tuple[BootstrapMode, Thresholds]:
+def _read_thresholds(thresholds: str) -> tuple[BootstrapMode, Thresholds]:
     """Return the mode of the bootstrap and the initial thresholds. Raises ValueError."""
     if thresholds in THRESHOLD_WORDS:
-        return THRESHOLD_WORDS[str(thresholds)], DEFAULT_THRESHOLDS
+        return THRESHOLD_WORDS[thresholds], DEFAULT_THRESHOLDS
     if not Path(thresholds).is_file():
         words = ", ".join(THRESHOLD_WORDS)
         raise ValueError(f"thresholds `{thresholds}`: neither one of {words} nor a file")
     return "never", read_thresholds(Path(thresholds))
 
 
-def _load_effects(folder: str | Path | None, project: Project) -> tuple[Effect, ...]:
+def _load_effects(folder: Path | None, project: Project) -> tuple[Effect, ...]:
     """Return the effects of a folder; without a folder those of the project and of the library.
 
     Raises SpecError and ValueError.
     """
-    return library_effects(project) if folder is None else load_effects(Path(folder))
+    return library_effects(project) if folder is None else load_effects(folder)
 
 
 @SingleThreadedBlas()
 def fit(
-    spec: str,
-    train: Sequence[str | Path],
-    parameters: Sequence[str] | None = None,
-    map: str | None = None,
-    root: Path | None = None,
+    spec: PathText,
+    train: PathTexts,
+    parameters: PathTexts | None = None,
+    map: PathText | None = None,
+    root: PathText | None = None,
     *,
     anyway: bool = False,
     tell: Report = lambda text: None,
@@ -329,11 +345,15 @@ def fit(
     `parameters` are the names to fit; None means all with a range. `map` defaults to the map of the
     spec. Recordings with errors are left out, unless `anyway`. `tell` is called with warnings and
     errors of recordings, with those left out, and with progress. Writes no file. Raises
-    UnusableRecordings if no recording remains, SpecError, ValueError and MissingToolError.
+    UnusableRecordings if no recording remains, SpecError, MissingToolError, and ValueError, also
+    for an empty `train` or `parameters`.
     """
-    require_disjoint(train, ())
-    checked = check_recordings(train, map, spec, root=root)
-    case, _ = _build_case(spec, train, (), checked, None, root)
+    spec, project, files = to_text(spec, "spec"), to_project(root), to_some_texts(train, "train")
+    names = optional(to_some_texts, parameters, "parameters")
+    map_name = optional(to_text, map, "map")
+    require_disjoint(files, ())
+    checked = check_recordings(files, map_name, spec, root=root)
+    case, _ = _build_case(spec, files, (), checked, None, project)
     usable_files, errors = select_usable(case, checked.check, anyway)
     findings = [f"{severity}: {text}" for severity, text in format_findings(checked.check.findings)]
     for text in dict.fromkeys((*findings, *(f"error: {text}" for text in errors))):
@@ -345,4 +365,4 @@ def fit(
         if file not in usable_files:
             tell(f"left out: {case.name_of(file)}")
     case = dataclasses.replace(case, train=usable_files)
-    return fit_case(case, parameters, tell)
+    return fit_case(case, names, tell)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable
-from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from diagnosis.model.effect_library import EffectDescription, describe_effect, library_effects
 from diagnosis.result.effect_naming import VERDICT_ALIASES
 from language.loading.load import automaton_of
 from language.overlays.expand_document import Project, expand_document, read_document
-from language.text.diagnostic import Problems, Source, Span, SpecError, suggest_name
+from language.text.arguments import PathText, optional, to_project, to_text
+from language.text.diagnostic import Problem, Source, Span, SpecError, suggest_name
 from language.text.document import Document
 
 if TYPE_CHECKING:
@@ -23,26 +23,30 @@ PREFIX_LENGTH = 4
 """Number of common first letters for which two names are considered similar."""
 
 
-def list_effects(at: str | None = None, root: Path | None = None) -> list[EffectDescription]:
+def list_effects(
+    at: PathText | None = None, root: PathText | None = None
+) -> list[EffectDescription]:
     """Return descriptions of all effects of the project and of the library.
 
     With a spec `at` each has the places where it fits in that spec, else none. Raises SpecError,
     also if `at` is no valid automaton.
     """
-    project = Project(root or Path())
-    document = _load_base(at, project) if at else None
+    project, base = to_project(root), optional(to_text, at, "at")
+    document = _load_base(base, project) if base else None
     return [describe_effect(effect, document, project) for effect in library_effects(project)]
 
 
-def find_effect(name: str, at: str | None = None, root: Path | None = None) -> EffectDescription:
+def find_effect(
+    name: str, at: PathText | None = None, root: PathText | None = None
+) -> EffectDescription:
     """Return the description of one effect; with a spec `at`, also its places in that spec.
 
     `name` may be `effect@place`: with `at` only this place is returned, without `at` the place is
     ignored. Old names of effects (VERDICT_ALIASES) are accepted. Raises SpecError for an unknown
     name, with similar names as help, and for a place where the effect does not fit.
     """
-    project = Project(root or Path())
-    document = _load_base(at, project) if at else None
+    project, base, name = to_project(root), optional(to_text, at, "at"), to_text(name, "name")
+    document = _load_base(base, project) if base else None
     known = {one.name: one for one in library_effects(project)}
     effect_name, _, place = name.partition("@")
     effect_name, _ = VERDICT_ALIASES.get(effect_name, (effect_name, ""))
@@ -77,14 +81,12 @@ def _suggest_name(name: str, known: Iterable[str]) -> str:
 
 def _raise_name_error(text: str, label: str, help: str) -> NoReturn:
     """Raise SpecError for a text of the command line."""
-    problems = Problems()
     span = Span(Source("command line", (text,)), 1, 1, max(1, len(text)))
-    problems.error("name", span, label, help)
-    raise SpecError(problems.reported)
+    raise SpecError([Problem("name", span, label, help)])
 
 
 def draw_signature(
-    name: str, at: str | None = None, root: Path | None = None, *, step: str | None = None
+    name: str, at: PathText | None = None, root: PathText | None = None, *, step: str | None = None
 ) -> Picture:
     """Draw the response of a spec to steps of an input, without and with an effect.
 
@@ -96,9 +98,10 @@ def draw_signature(
     """
     from diagnosis.model.effect_signature import draw_signature, simulate_signature
 
-    project = Project(root or Path())
-    document = _load_base(at or DEFAULT_BASE, project)
-    layers = find_effect(name, at or DEFAULT_BASE, root).placements
+    project, base = to_project(root), optional(to_text, at, "at") or DEFAULT_BASE
+    step = optional(to_text, step, "step")
+    document = _load_base(base, project)
+    layers = find_effect(name, base, root).placements
     if not layers:
         raise ValueError(f"`{name}` fits no place of `{document.name}`")
     parsed_step = _parse_step(step) if step else None

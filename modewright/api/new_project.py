@@ -8,6 +8,7 @@ import tempfile
 from importlib import resources
 from pathlib import Path
 
+from language.text.arguments import PathText, to_path, to_text
 from modewright.runtime.output_files import OutputError
 
 NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}", re.ASCII)
@@ -39,13 +40,14 @@ def skeleton_files(name: str) -> dict[str, str]:
     }
 
 
-def write_skeleton(name: str, folder: Path) -> list[Path]:
+def write_skeleton(name: str, folder: PathText) -> list[Path]:
     """Write a new project into a folder that does not exist yet, and return the paths of its files.
 
     The folder appears complete or not at all; missing parents are created. Raises ValueError for a
     name that does not match NAME_PATTERN or is in RESERVED_NAMES, and OutputError if the folder
     exists or cannot be written.
     """
+    name, folder = to_text(name, "name"), to_path(folder, "folder")
     if not NAME_PATTERN.fullmatch(name) or name in RESERVED_NAMES:
         raise ValueError(f"`{name}` cannot be the name of a system: letters, digits and _")
     if folder.exists():

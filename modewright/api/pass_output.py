@@ -1,11 +1,9 @@
-"""Explaining: print a spec after each pass, and compare two specs."""
+"""Pass output: print a spec after each pass, and compare two specs."""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from language.ir.printer import format_program
 from language.loading.load import automaton_of, command_line_value, lower_automaton, program_of
@@ -21,6 +19,7 @@ from language.overlays.expand_document import (
 )
 from language.passes.constant_folding import PASSES
 from language.programs.solved_numbers_report import format_solved_numbers
+from language.text.arguments import PathText, to_choice, to_project, to_text
 from language.text.diagnostic import Problems, SpecError
 from language.text.document import Document
 from language.text.node_edit import format_inline
@@ -31,26 +30,29 @@ from language.text.provenance import (
     format_spec,
     provenance_entries,
 )
+from modewright.api.documents import Values, literals_of
 from modewright.runtime.json_format import format_entry
 
 PassName = Literal["document", "model", "lowered", "parameters", "inputs", "program", "numbers"]
-Values = Mapping[str, str]
 
 
-def explain_spec(spec: str, stage: PassName, values: Values, root: Path | None = None) -> str:
+def explain_spec(
+    spec: PathText, stage: PassName, values: Values, root: PathText | None = None
+) -> str:
     """Return the text of a spec after the pass `stage`.
 
     The passes are `document`, `model`, `lowered`, the keys of PASSES in their order, and `numbers`
-    (solved numbers). `values` are parameter values as texts; `document` ignores them. A calibration
-    has the same text for all passes but `document`: one line for each value. Raises SpecError.
+    (solved numbers). `values` are parameter values; `document` ignores them. A calibration has the
+    same text for all passes but `document`: one line for each value. Raises SpecError, and
+    ValueError for another pass.
     """
-    project = Project(root or Path())
-    document = read_document(project.path_of(spec))
+    project, stage = to_project(root), to_choice(stage, get_args(PassName), "stage")
+    scalars = {name: command_line_value(text) for name, text in literals_of(values).items()}
+    document = read_document(project.path_of(to_text(spec, "spec")))
     if stage == "document":
         return format_spec(_expand_document(document, project).root)
     if document.kind == "calibration":
         return _calibration_text(document, project)
-    scalars = {name: command_line_value(text) for name, text in values.items()}
     automaton = automaton_of(document, project, scalars)
     if stage == "model":
         return format_model(automaton)
@@ -95,43 +97,50 @@ def _calibration_text(document: Document, project: Project) -> str:
 
 
 def compare_specs(
-    spec: str, other: str, stage: PassName, values: Values, root: Path | None = None
+    spec: PathText,
+    other: PathText,
+    stage: PassName,
+    values: Values,
+    root: PathText | None = None,
 ) -> str:
     """Return the difference of two specs after a pass as text; empty if they are equal.
 
     For `document` the differences are by key; else they are a unified diff of both results of
     `explain_spec` with `values`. Raises SpecError.
     """
+    names = to_text(spec, "spec"), to_text(other, "other")
     if stage == "document":
-        project = Project(root or Path())
-        old, new = (_load_expanded(name, project).root for name in (spec, other))
+        project = to_project(root)
+        old, new = (_load_expanded(name, project).root for name in names)
         return format_diff(diff_specs(old, new))
-    before, after = (explain_spec(name, stage, values, root).splitlines() for name in (spec, other))
-    found = difflib.unified_diff(before, after, spec, other, lineterm="")
+    before, after = (explain_spec(name, stage, values, root).splitlines() for name in names)
+    found = difflib.unified_diff(before, after, *names, lineterm="")
     return "".join(f"{line}\n" for line in found)
 
 
-def spec_json(spec: str, root: Path | None = None) -> dict[str, Any]:
+def spec_json(spec: PathText, root: PathText | None = None) -> dict[str, Any]:
     """Return the values of an expanded spec with their places, as a dict for JSON.
 
     The keys are `format`, `kind`, `name` and `values`: one value for each scalar, list and empty
     mapping, with `path`, `value`, `place`, `layer` (the overlay that gave it) and `changes` (places
     and overlays that replaced earlier values). Raises SpecError.
     """
-    document = _load_expanded(spec, Project(root or Path()))
+    document = _load_expanded(to_text(spec, "spec"), to_project(root))
     found = [_row_json(row) for row in provenance_entries(document.root)]
     head = {"kind": document.kind, "name": document.name}
     return {**format_entry("spec"), **head, "values": found}
 
 
-def spec_differences_json(spec: str, other: str, root: Path | None = None) -> dict[str, Any]:
+def spec_differences_json(
+    spec: PathText, other: PathText, root: PathText | None = None
+) -> dict[str, Any]:
     """Return the differences of two expanded specs as a dict for JSON.
 
     The keys are `format` and `differences`; each difference has `path`, `old` and `new`, which are
     values as in `spec_json`, or None where a spec lacks the path. Raises SpecError.
     """
-    project = Project(root or Path())
-    old, new = (_load_expanded(name, project).root for name in (spec, other))
+    project, names = to_project(root), (to_text(spec, "spec"), to_text(other, "other"))
+    old, new = (_load_expanded(name, project).root for name in names)
     found = [
         {
             "path": difference.path,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from diagnosis.data.recording_names import distinguish_file_names
 from diagnosis.data_quality.column_hypothesis import find_clock_and_sign_errors
-from diagnosis.data_quality.finding import format_findings
+from diagnosis.data_quality.finding import Finding, format_findings
 from diagnosis.data_quality.recording_check import (
     RecordingCheck,
     check_recordings as run_checks,
@@ -22,12 +22,21 @@ from diagnosis.data_quality.recording_check import (
 from diagnosis.data_quality.recording_map_inference import guess_map
 from diagnosis.pipeline.diagnosis_case import Case
 from engine.recordings.recording import Recording, read_recording
-from language.loading.load import automaton_of
+from language.loading.load import load_automaton
 from language.loading.recording_map_columns import check_pairing
 from language.loading.recording_map_reader import read_map
 from language.model.automaton import Automaton
 from language.model.system import RecordingMap
-from language.overlays.expand_document import Project, expand_document, read_document
+from language.overlays.expand_document import expand_document, read_document
+from language.text.arguments import (
+    PathText,
+    PathTexts,
+    optional,
+    to_project,
+    to_some_texts,
+    to_text,
+    to_texts,
+)
 from language.text.diagnostic import MissingToolError, Problems, SpecError
 from modewright.runtime.back_end_choice import simulate_resolved
 
@@ -62,23 +71,26 @@ class CheckedRecordings:
 
 
 def check_recordings(
-    files: Sequence[str | Path],
-    map: str | None = None,
-    spec: str | None = None,
-    databases: Sequence[str] = (),
-    root: Path | None = None,
+    files: PathTexts,
+    map: PathText | None = None,
+    spec: PathText | None = None,
+    databases: PathTexts = (),
+    root: PathText | None = None,
 ) -> CheckedRecordings:
     """Read recordings and check their rates, gaps, noise and excitation.
 
     With a spec units, signs and clocks are checked, too, and only the columns that it uses are
-    read. `map` defaults to the map that the spec names. Without map and spec the columns of the
-    first file are guessed by name, with DBC files `databases`. Findings, also missing columns, are
-    returned and not raised. Raises SpecError for unreadable files, for a spec without map and for a
-    map that does not fit; MissingToolError; and ValueError if a file occurs twice.
+    read. `map` defaults to the map that the spec names. Without map and spec the columns of all
+    files are guessed by name, with DBC files `databases`, and those left out are findings.
+    Findings, also missing columns, are returned and not raised. Raises SpecError for unreadable
+    files, for a spec without map and for a map that does not fit; MissingToolError; and ValueError
+    without a file and if a file occurs twice.
     """
-    project = Project(root or Path())
-    automaton = _load_automaton(spec, project) if spec else None
-    map_name = map or (
+    project, paths = to_project(root), [Path(file) for file in to_some_texts(files, "files")]
+    map_name, spec = optional(to_text, map, "map"), optional(to_text, spec, "spec")
+    database_files = to_texts(databases, "databases")
+    automaton = load_automaton(spec, project) if spec else None
+    map_name = map_name or (
         automaton.recording_map.text if automaton and automaton.recording_map else None
     )
     if automaton and not map_name:
@@ -87,20 +99,22 @@ def check_recordings(
         hint = "`recording_map: <name>` in the spec, or `--map`"
         problems.error("missing", automaton.span, label, hint)
         raise SpecError(problems.reported)
-    if map_name:
-        mapping = read_map(read_document(project.path_of(map_name)), project)
+    mapping = read_map(read_document(project.path_of(map_name)), project) if map_name else None
+    if mapping is not None:
         _check_map(automaton, mapping)
-    else:
-        mapping = guess_map(Path(files[0]), databases)
-    used = used_columns(mapping, automaton)
-    if len({os.path.realpath(file) for file in files}) < len(files):
+    if len({os.path.realpath(path) for path in paths}) < len(paths):
         raise ValueError("a recording is named twice: each recording counts once")
-    names = distinguish_file_names([Path(file) for file in files])
+    names = distinguish_file_names(paths)
+    file_findings: tuple[Finding, ...] = ()
+    if mapping is None:
+        mapping, file_findings = guess_map(names, database_files)
+    used = used_columns(mapping, automaton)
     read = [_read_available(path, name, mapping, used) for path, name in names.items()]
     recordings = tuple(recording for recording, _ in read)
     reasons = {recording.name: why for recording, why in read}
     if spec is None or automaton is None:
-        check = _add_missing_reasons(run_checks(recordings, mapping, automaton), reasons)
+        check = run_checks(recordings, mapping, automaton, file_findings=file_findings)
+        check = _add_missing_reasons(check, reasons)
         return CheckedRecordings(check, mapping, recordings)
     document = expand_document(read_document(project.path_of(spec)), project)
     mistakes = partial(find_clock_and_sign_errors, document, project, automaton, mapping)
@@ -185,8 +199,3 @@ def _check_map(automaton: Automaton | None, mapping: RecordingMap) -> None:
     if automaton is not None:
         check_pairing(automaton, mapping, problems)
     problems.raise_if_errors()
-
-
-def _load_automaton(spec: str, project: Project) -> Automaton:
-    """Return the automaton of a spec. Raises SpecError."""
-    return automaton_of(read_document(project.path_of(spec)), project)

@@ -7,12 +7,11 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
-from codegen.toolchain.compiler import flags_at_level
+from codegen.toolchain.compiler import OPTIMISATION_LEVELS, flags_at_level
 from codegen.toolchain.target_machine import CORTEX_M4F, HOST, MACHINES
 from engine.recordings.recording import Recording, read_recording
 from engine.results.trajectory import Trajectory
@@ -26,19 +25,34 @@ from language.loading.scenario_reader import read_scenario
 from language.loading.system_reader import read_system, with_number_type
 from language.lowering.range_saturation import require_ranges
 from language.model.automaton import Automaton
-from language.model.system import RecordingMap, Scenario, System
+from language.model.system import Scenario, System
 from language.overlays.expand_document import (
     Project,
     add_calibrations,
     apply_variant,
     read_document,
 )
-from language.text.diagnostic import Problems, SpecError
-from language.text.document import require_kind
+from language.text.arguments import (
+    PathText,
+    PathTexts,
+    optional,
+    to_choice,
+    to_path,
+    to_project,
+    to_text,
+    to_texts,
+)
+from language.text.diagnostic import Problem, Problems, SpecError
+from language.text.document import ScalarNode, require_kind
 from lockstep.comparison import Verdict, add_instruction_counts, compare
 from lockstep.comparison_scope import add_notes
 from lockstep.tick_log import TickLog, record_ticks
-from modewright.api.documents import Values, load_calibrated_document, parse_values
+from modewright.api.documents import (
+    Values,
+    load_calibrated_document,
+    number_type_of,
+    parse_values,
+)
 from modewright.runtime.back_end_choice import run_simulation as run_compiled
 
 METHODS = ("RK4", "DOP853", "Radau", "LSODA")
@@ -67,34 +81,34 @@ class Replayed:
 
 
 def load(
-    system: str,
-    scenario: str,
+    system: PathText,
+    scenario: PathText,
     values: Values | None = None,
-    root: Path | None = None,
-    calibrations: Sequence[str] = (),
+    root: PathText | None = None,
+    calibrations: PathTexts = (),
 ) -> Loaded:
     """Return a checked system with a checked scenario, both by name or path.
 
     `calibrations` and then `values` (`instance.parameter` or `parameter`) replace parameter values
     of the system. Raises SpecError.
     """
-    project = Project(root or Path())
-    parsed_system = read_system(
-        load_calibrated_document(system, project, calibrations), project, parse_values(values)
-    )
-    document = read_document(project.path_of(scenario))
+    project, scalars = to_project(root), parse_values(values)
+    scenario_name = to_text(scenario, "scenario")
+    system_document = load_calibrated_document(to_text(system, "system"), project, calibrations)
+    parsed_system = read_system(system_document, project, scalars)
+    document = read_document(project.path_of(scenario_name))
     return Loaded(parsed_system, read_scenario(document, project, parsed_system))
 
 
 def simulate(
-    system: str,
-    scenario: str,
+    system: PathText,
+    scenario: PathText,
     values: Values | None = None,
-    root: Path | None = None,
+    root: PathText | None = None,
     *,
     reference: bool = False,
     method: str = "RK4",
-    calibrations: Sequence[str] = (),
+    calibrations: PathTexts = (),
     compiled: bool | None = None,
 ) -> Trajectory:
     """Return the trajectory of a system or automaton in a scenario.
@@ -121,24 +135,26 @@ def simulate(
     return trajectory
 
 
-def program(reference: str, values: Values | None = None, root: Path | None = None) -> Program:
+def program(
+    reference: PathText, values: Values | None = None, root: PathText | None = None
+) -> Program:
     """Return the Program of an automaton with `values` applied. Raises SpecError."""
-    project = Project(root or Path())
-    document = read_document(project.path_of(reference))
-    return program_of(automaton_of(document, project, parse_values(values)))
+    project, scalars = to_project(root), parse_values(values)
+    document = read_document(project.path_of(to_text(reference, "reference")))
+    return program_of(automaton_of(document, project, scalars))
 
 
 def lockstep(
-    system: str,
-    scenario: str,
+    system: PathText,
+    scenario: PathText,
     values: Values | None = None,
-    root: Path | None = None,
+    root: PathText | None = None,
     *,
     numbers: NumberType | None = None,
-    changes: Sequence[str] = (),
-    compiler: str | None = None,
+    changes: PathTexts = (),
+    compiler: PathText | None = None,
     optimise: str = "O2",
-    calibrations: Sequence[str] = (),
+    calibrations: PathTexts = (),
     target: str = HOST.name,
 ) -> tuple[Trajectory, list[Verdict]]:
     """Simulate a system, run the C of each instance on the same inputs and compare all bits.
@@ -148,20 +164,23 @@ def lockstep(
     emulator, which also counts instructions. `numbers` replaces the number type of each instance.
     `changes` are calibration pages such as `1.5 s: k_hs = 6000 N*m/rad`; if there are any, they
     replace those of the scenario. `compiler` is a C compiler instead of the default, `optimise` its
-    level. Raises SpecError, MissingToolError and BuildError.
+    level (OPTIMISATION_LEVELS). Raises SpecError, MissingToolError, BuildError, and ValueError for
+    another number type, level or target.
     """
+    numbers, page_texts = number_type_of(numbers), to_texts(changes, "changes")
+    flags = flags_at_level(to_choice(optimise, OPTIMISATION_LEVELS, "optimise"))
+    machine = MACHINES[to_choice(target, MACHINES, "target")]
+    compiler = optional(to_text, compiler, "compiler")
     loaded = load(system, scenario, values, root, calibrations)
     if numbers:
         loaded = Loaded(with_number_type(loaded.system, numbers), loaded.scenario)
-    if changes:
-        pages = parse_pages(changes, loaded.system)
+    if page_texts:
+        pages = parse_pages(page_texts, loaded.system)
         loaded = Loaded(loaded.system, dataclasses.replace(loaded.scenario, calibrations=pages))
     for instance in loaded.system.instances.values():
         if instance.automaton.is_sampled:
             require_ranges(instance.automaton)
     trajectory, tapes = record_ticks(loaded.system, loaded.scenario)
-    flags = flags_at_level(optimise)
-    machine = MACHINES[target]
     verdicts = [compare(tape, flags, compiler, machine) for tape in tapes.values()]
     if machine is CORTEX_M4F:
         verdicts = [
@@ -171,15 +190,15 @@ def lockstep(
 
 
 def replay(
-    estimator: str,
-    recording: Path,
-    map: str,
-    variant: str | None = None,
+    estimator: PathText,
+    recording: PathText,
+    map: PathText,
+    variant: PathText | None = None,
     values: Values | None = None,
-    root: Path | None = None,
+    root: PathText | None = None,
     *,
     compiled: bool = True,
-    calibrations: Sequence[str] = (),
+    calibrations: PathTexts = (),
 ) -> Replayed:
     """Replay a recording through a sampled automaton and compare it with its C in lock-step.
 
@@ -188,10 +207,16 @@ def replay(
     is an overlay of the automaton. Raises SpecError, also for a continuous automaton and an input
     without column, MissingToolError and BuildError.
     """
-    automaton, used = _load_estimator(estimator, variant, values, root, calibrations)
-    mapping = _load_map(map, root)
+    project, scalars = to_project(root), parse_values(values)
+    file, map_name = to_path(recording, "recording"), to_text(map, "map")
+    names = to_texts(calibrations, "calibrations")
+    variant_name = optional(to_text, variant, "variant")
+    automaton, used = _load_estimator(
+        to_text(estimator, "estimator"), variant_name, scalars, project, names
+    )
+    mapping = read_map(read_document(project.path_of(map_name)), project)
     columns, left_out = used_columns(automaton, mapping)
-    measured = read_recording(recording, mapping, columns)
+    measured = read_recording(file, mapping, columns)
     tape = TickLog(used, name=automaton.name)
     result = replay_recording(automaton, used, measured, mapping, on_tick=tape.record_tick)
     tape.start = float(result.trajectory.times[0])
@@ -202,15 +227,14 @@ def replay(
 def _load_estimator(
     reference: str,
     variant: str | None,
-    values: Values | None,
-    root: Path | None,
+    values: Mapping[str, ScalarNode],
+    project: Project,
     calibrations: Sequence[str],
 ) -> tuple[Automaton, Program]:
     """Return a sampled automaton and its Program with variant, calibrations and values applied.
 
     Raises SpecError, also for a continuous automaton.
     """
-    project = Project(root or Path())
     document = read_document(project.path_of(reference))
     if variant:
         over = read_document(project.path_of(variant))
@@ -218,16 +242,8 @@ def _load_estimator(
         require_kind(over, "variant", problems)
         document = apply_variant(document, over, project, problems)
     document = add_calibrations(document, calibrations, "--calibration")
-    automaton = automaton_of(document, project, parse_values(values))
+    automaton = automaton_of(document, project, values)
     if not automaton.is_sampled:
-        problems = Problems()
         label = f"`{automaton.name}` is continuous: only a sampled automaton reads a recording"
-        problems.error("form", automaton.span, label, "give it a `period`")
-        raise SpecError(problems.reported)
+        raise SpecError([Problem("form", automaton.span, label, "give it a `period`")])
     return automaton, program_of(automaton)
-
-
-def _load_map(reference: str, root: Path | None) -> RecordingMap:
-    """Return a map of recordings. Raises SpecError."""
-    project = Project(root or Path())
-    return read_map(read_document(project.path_of(reference)), project)

@@ -19,6 +19,7 @@ from language.overlays.calibration import read_calibration
 from language.overlays.effect_reader import read_effect
 from language.overlays.expand_document import Project, add_calibrations, expand_document
 from language.programs.solved_numbers_report import format_method_lines
+from language.text.arguments import PathText, to_path, to_project, to_text
 from language.text.diagnostic import Problem, Problems, SpecError, sort_problems
 from language.text.document import Document, ScalarNode
 from sweep.definition.study_reader import read_study
@@ -35,7 +36,7 @@ class CheckResult:
     limits: tuple[str, ...] = ()
 
 
-def check(reference: str, root: Path | None = None) -> list[Problem]:
+def check(reference: PathText, root: PathText | None = None) -> list[Problem]:
     """Return all problems of a spec including warnings, each once; an empty list if there are none.
 
     `reference` is a name or path below `root` (default: the working folder). Errors of the spec,
@@ -45,7 +46,7 @@ def check(reference: str, root: Path | None = None) -> list[Problem]:
 
 
 def check_spec(
-    reference: str, root: Path | None = None, texts: Mapping[Path, str] | None = None
+    reference: PathText, root: PathText | None = None, texts: Mapping[Path, str] | None = None
 ) -> CheckResult:
     """Return all problems of a spec, each once, and lines about the largest stable steps.
 
@@ -55,8 +56,8 @@ def check_spec(
     not raised but converted to problems.
     """
     return _run_checks(
-        reference,
-        Project(root or Path(), texts or {}),
+        to_text(reference, "reference"),
+        to_project(root, texts),
         _DeepChecks(lower_automaton, check_warnings),
     )
 
@@ -134,9 +135,9 @@ def merge_problems(results: Iterable[CheckResult]) -> list[Problem]:
     return sort_problems(problem for each in results for problem in each.problems)
 
 
-def spec_files(root: Path) -> Iterator[Path]:
+def spec_files(root: PathText) -> Iterator[Path]:
     """Yield the files `*.yaml` below `spec/` of a project, at any depth, sorted by path."""
-    yield from sorted((root / "spec").rglob("*.yaml"))
+    yield from sorted((to_path(root, "root") / "spec").rglob("*.yaml"))
 
 
 def problem_json(problem: Problem) -> dict[str, Any]:
@@ -165,6 +166,6 @@ def _check_scenario(reference: str, project: Project) -> None:
         system = read_system(project.read(project.path_of(node.text, node.span)), project)
         read_scenario(document, project, system)
         return
-    problems = Problems()
-    problems.error("missing", document.name_span, "a scenario says what system it is `of`")
-    raise SpecError(problems.reported)
+    raise SpecError(
+        [Problem("missing", document.name_span, "a scenario says what system it is `of`")]
+    )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from expectation.coverage_measurement import (
@@ -14,7 +13,8 @@ from expectation.coverage_measurement import (
     names_of,
 )
 from expectation.mcdc import COVERED, Decision
-from language.text.diagnostic import Problems, Source, Span, SpecError
+from language.text.arguments import PathText
+from language.text.diagnostic import Problem, Source, Span, SpecError
 from modewright.api.spec_tests import find_tests, load_tests
 from modewright.diagram.diagram import Diagram, graph
 from modewright.diagram.diagram_elements import Arrow, ModeBox, ModePath, RegionBox, Shade
@@ -49,7 +49,7 @@ def coverage_json(coverage: Coverage) -> dict[str, Any]:
     }
 
 
-def coverage_diagram(coverage: Coverage, root: Path | None = None) -> Diagram:
+def coverage_diagram(coverage: Coverage, root: PathText | None = None) -> Diagram:
     """Return the diagram of the covered automaton, read again from its file, shaded by coverage.
 
     Raises SpecError.
@@ -57,7 +57,7 @@ def coverage_diagram(coverage: Coverage, root: Path | None = None) -> Diagram:
     return shade_diagram(graph(coverage.automaton.span.source.name, root), coverage)
 
 
-def project_coverage_diagram(reference: str, root: Path | None = None) -> Diagram:
+def project_coverage_diagram(reference: PathText, root: PathText | None = None) -> Diagram:
     """Return the diagram of an automaton shaded by the coverage of the project's tests.
 
     The tests whose system has an instance of the automaton are run on the engine and their
@@ -69,10 +69,10 @@ def project_coverage_diagram(reference: str, root: Path | None = None) -> Diagra
     used = [test for test, own in zip(tests, names, strict=True) if diagram.name in own]
     parts = [part for test in used for part in measure_coverage(test) if part.name == diagram.name]
     if not parts:
-        problems = Problems()
         label = f"no test of the project runs `{diagram.name}`"
-        problems.error("missing", Span(Source("spec"), 1, 1), label, "see docs/testing.md")
-        raise SpecError(problems.reported)
+        raise SpecError(
+            [Problem("missing", Span(Source("spec"), 1, 1), label, "see docs/testing.md")]
+        )
     return shade_diagram(diagram, merge_coverages(parts)[0])
 
 

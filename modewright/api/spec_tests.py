@@ -14,8 +14,16 @@ from engine.simulation.simulate import simulate
 from expectation.evaluate_expectations import Outcome, evaluate_test
 from expectation.expectation_reader import read_test
 from expectation.expectations import Test
-from language.overlays.expand_document import Project
-from language.text.diagnostic import Problems, Source, Span, SpecError
+from language.text.arguments import (
+    PathText,
+    PathTexts,
+    optional,
+    to_project,
+    to_some_texts,
+    to_text,
+    to_texts,
+)
+from language.text.diagnostic import Problem, Problems, Source, Span, SpecError
 from language.text.project_files import HEAD_PATTERN
 from modewright.api.spec_check import spec_files
 from modewright.runtime.back_end_choice import run_in_c
@@ -45,28 +53,28 @@ class TestRun:
         return all_passed and not self.difference and self.stopped is None
 
 
-def find_tests(root: Path | None = None) -> list[str]:
+def find_tests(root: PathText | None = None) -> list[str]:
     """Return the paths of all YAML files below `spec/` that contain a test, sorted by path.
 
     These are files with a line `test: name` without indentation in their first 64 KiB; they are not
     parsed.
     """
-    return [str(path) for path in spec_files(root or Path()) if _is_test(path)]
+    return [str(path) for path in spec_files(to_project(root).root) if _is_test(path)]
 
 
-def load_test(reference: str, root: Path | None = None) -> Test:
+def load_test(reference: PathText, root: PathText | None = None) -> Test:
     """Return a test by name or path. Raises SpecError with all its problems."""
-    project = Project(root or Path())
-    return read_test(project.read(project.path_of(reference)), project)
+    project = to_project(root)
+    return read_test(project.read(project.path_of(to_text(reference, "reference"))), project)
 
 
-def load_tests(references: Sequence[str], root: Path | None = None) -> list[Test]:
+def load_tests(references: PathTexts, root: PathText | None = None) -> list[Test]:
     """Return tests by name or path in the given order.
 
     Raises SpecError with the problems of all of them after all were read.
     """
     problems, tests = Problems(), []
-    for reference in references:
+    for reference in to_texts(references, "references"):
         with problems.collect_errors():
             tests.append(load_test(reference, root))
     problems.raise_if_errors()
@@ -74,20 +82,20 @@ def load_tests(references: Sequence[str], root: Path | None = None) -> list[Test
 
 
 def run_tests(
-    references: Sequence[str] = (), root: Path | None = None, *, compiled: bool = True
+    references: PathTexts | None = None, root: PathText | None = None, *, compiled: bool = True
 ) -> Iterator[TestRun]:
-    """Yield the result of each test; without references, of all tests of the project.
+    """Yield the result of each test; for None as references, of all tests of the project.
 
     All tests are read before the first one runs. `compiled` also runs them in C. Raises SpecError,
-    also if the project has no test, and MissingToolError without a compiler; a failed test is a
-    result.
+    also if the project has no test, ValueError for an empty list, and MissingToolError without a
+    compiler; a failed test is a result.
     """
-    named = list(references) or find_tests(root)
+    named = optional(to_some_texts, references, "references") or find_tests(root)
     if not named:
         place = Span(Source("spec"), 1, 1)
-        problems = Problems()
-        problems.error("missing", place, "there is no test below spec/", "see docs/testing.md")
-        raise SpecError(problems.reported)
+        raise SpecError(
+            [Problem("missing", place, "there is no test below spec/", "see docs/testing.md")]
+        )
     for test in load_tests(named, root):
         yield run_test(test, compiled=compiled)
 
@@ -141,6 +149,8 @@ def _trajectory_difference(ours: Trajectory, theirs: Trajectory) -> str:
 
 
 def _is_test(path: Path) -> bool:
-    """Return whether a file contains a test, from its first 64 KiB."""
+    """Return whether a file contains a test, from its first 64 KiB; a device contains none."""
+    if not path.is_file():
+        return False
     text = path.read_text("utf-8", errors="replace")[:65536]
     return any(match.group(1) == "test" for match in HEAD_PATTERN.finditer(text))

@@ -1,4 +1,4 @@
-"""Generated C: compare the C below a folder with the specs of the project."""
+"""Stale generated code: compare the C below a folder with the specs of the project."""
 
 from __future__ import annotations
 
@@ -6,40 +6,38 @@ from pathlib import Path
 
 from codegen.emit.c_module import emit_c_files
 from language.loading.load import automaton_of, program_of
-from language.overlays.expand_document import Project, expand_document, read_document
+from language.overlays.expand_document import expand_document, read_document
+from language.text.arguments import PathText, to_path, to_project
 from modewright.api.spec_check import spec_files
 
-MATH_LIBRARY_FILES = ("ha_math.h", "ha_math.c", "ha_mathf.h", "ha_mathf.c")
-"""The files of the mathematical library among the generated files."""
 
-
-def generated_files(root: Path, out: Path) -> dict[Path, bytes]:
+def generated_files(root: PathText, out: PathText) -> dict[Path, bytes]:
     """Return the bytes of each file that belongs below the folder `out`, by path.
 
     The C of each automaton in `spec/<folder>/` of the project `root` belongs in `out/<folder>/`;
     other kinds of specs are skipped. Writes no file. Raises SpecError.
     """
-    project = Project(root)
+    project, out_folder = to_project(root), to_path(out, "out")
     files: dict[Path, bytes] = {}
-    for path in spec_files(root):
+    for path in spec_files(project.root):
         document = read_document(path)
         if expand_document(document, project).kind != "automaton":
             continue
         automaton = automaton_of(document, project)
-        folder = out / path.parent.relative_to(root / "spec")
+        folder = out_folder / path.parent.relative_to(project.root / "spec")
         for name, text in emit_c_files(program_of(automaton)).items():
             files[folder / name] = text.encode()
     return files
 
 
-def stale_files(root: Path, out: Path) -> list[str]:
+def stale_files(root: PathText, out: PathText) -> list[str]:
     """Return one line for each missing, different or superfluous file below the folder `out`.
 
     A line is `path: reason`. Superfluous are `*.h` and `*.c` that no spec generates; they come
     last. Empty if all is up to date. Raises SpecError.
     """
     expected = generated_files(root, out)
-    present = {path for path in out.rglob("*.[ch]") if path.is_file()}
+    present = {path for path in to_path(out, "out").rglob("*.[ch]") if path.is_file()}
     lines = []
     for path, data in expected.items():
         if path not in present:

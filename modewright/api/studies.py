@@ -7,13 +7,13 @@ import sys
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from language.loading.load import command_line_value
 from language.overlays.expand_document import Project, read_document
+from language.text.arguments import PathText, optional, to_count, to_path, to_project, to_text
 from language.text.diagnostic import MissingToolError, Problems, render_problem, sort_problems
 from language.text.document import ScalarNode
+from modewright.api.documents import Values, parse_values
 from modewright.runtime.back_end_choice import run_block
 from modewright.runtime.output_files import OutputError
 from sweep.analysis.summary import Summary, summary_of
@@ -41,10 +41,10 @@ TEMPLATE_MODULE = "modewright.workers.preloaded_modules"
 
 
 def sweep(
-    study: str,
-    out: str | Path,
-    values: Mapping[str, str] | None = None,
-    root: Path | None = None,
+    study: PathText,
+    out: PathText,
+    values: Values | None = None,
+    root: PathText | None = None,
     *,
     workers: int | None = None,
     block: int | None = None,
@@ -66,24 +66,28 @@ def sweep(
     with damaged blocks; by default these are Python warnings. Raises SpecError, ValueError,
     ClusterError, MissingToolError and OutputError.
     """
+    name, folder, project = to_text(study, "study"), to_path(out, "out"), to_project(root)
+    scalars, cluster = parse_values(values), optional(to_text, cluster, "cluster")
+    count, block = optional(to_count, workers, "workers"), optional(to_count, block, "block")
+    samples, seed = optional(to_count, samples, "samples"), optional(to_count, seed, "seed")
     place = parse_address(cluster) if cluster else None
     if place and place.count:
         fork_server.start_fork_server(TEMPLATE_MODULE)
     if block is not None and block < 1:
         raise ValueError(f"blocks of {block} variants are none")
     tell = warn or warnings.warn
-    found = _read_study(study, values or {}, Project(root or Path()), tell)
+    found = _read_study(name, scalars, project, tell)
     ready = prepare_study(_override_sampling(found, samples, seed, tell))
     try:
         if place is None:
             return run_study(
-                ready, Path(out), executor or _local_executor(workers), block, progress, tell
+                ready, folder, executor or _local_executor(count), block, progress, tell
             )
         with _cluster_executor(place, credentials or Credentials()) as remote:
-            return run_study(ready, Path(out), remote, block, progress, tell)
+            return run_study(ready, folder, remote, block, progress, tell)
     except OSError as error:
         where = f" {error.filename}" if error.filename else ""
-        raise OutputError(f"{out}: cannot write{where}: {error.strerror}") from None
+        raise OutputError(f"{folder}: cannot write{where}: {error.strerror}") from None
 
 
 def _local_executor(workers: int | None) -> Executor:
@@ -92,18 +96,17 @@ def _local_executor(workers: int | None) -> Executor:
     return ProcessExecutor(count, WORKER_COMMAND) if count > 1 else SerialExecutor(run_block)
 
 
-def _read_study(study: str, values: Mapping[str, str], project: Project, warn: Warn) -> Study:
+def _read_study(
+    study: str, values: Mapping[str, ScalarNode], project: Project, warn: Warn
+) -> Study:
     """Return a study with values of the command line; passes its warnings to `warn`.
 
     Raises SpecError, and ValueError for a value of a parameter that the study sets.
     """
     document = read_document(project.path_of(study))
-    scalars: dict[str, ScalarNode] = {
-        name: command_line_value(text, name=name) for name, text in values.items()
-    }
     problems = Problems()
-    result = read_study(document, project, scalars, problems)
-    require_overridable(result, scalars)
+    result = read_study(document, project, values, problems)
+    require_overridable(result, values)
     for problem in sort_problems(dict.fromkeys(problems.reported)):
         warn(render_problem(problem))
     return result
@@ -137,16 +140,16 @@ def _cluster_executor(place: Address, credentials: Credentials) -> Iterator[Exec
         yield DaskExecutor(client, cluster_worker.compute_block)
 
 
-def study_summary(out: str | Path) -> Summary:
+def study_summary(out: PathText) -> Summary:
     """Return the summary of the results in the folder of a study, which may be incomplete.
 
     Nothing is simulated. Raises SpecError if the folder has no results or a damaged block, and
     MissingToolError without pyarrow.
     """
-    return summary_of(read_store(Path(out)))
+    return summary_of(read_store(to_path(out, "out")))
 
 
-def study_pictures(out: str | Path) -> dict[str, Picture]:
+def study_pictures(out: PathText) -> dict[str, Picture]:
     """Return the plots that a study defines, by name, from the results in its folder.
 
     No file is written. Raises SpecError if the folder has no results or a damaged block, and
@@ -154,10 +157,10 @@ def study_pictures(out: str | Path) -> dict[str, Picture]:
     """
     from sweep.analysis.plots import draw_pictures
 
-    return draw_pictures(read_store(Path(out)))
+    return draw_pictures(read_store(to_path(out, "out")))
 
 
-def sensitivity(out: str | Path) -> Sensitivity:
+def sensitivity(out: PathText) -> Sensitivity:
     """Return the sensitivity indices of the random variables of a study, from its stored results.
 
     Only finished variants count. Raises SpecError if the study was not sampled by `saltelli` or
@@ -165,4 +168,4 @@ def sensitivity(out: str | Path) -> Sensitivity:
     """
     from sweep.analysis.sensitivity import sensitivity_of
 
-    return sensitivity_of(read_store(Path(out)))
+    return sensitivity_of(read_store(to_path(out, "out")))

@@ -1,4 +1,4 @@
-"""Traces: relate requirements and keys of specs to C code and tests."""
+"""Traceability: relate requirements and keys of specs to C code and tests."""
 
 from __future__ import annotations
 
@@ -18,6 +18,14 @@ from language.loading.load import automaton_of, program_of
 from language.loading.system_reader import read_system
 from language.model.automaton import Automaton
 from language.overlays.expand_document import Project, expand_document, read_document
+from language.text.arguments import (
+    PathText,
+    PathTexts,
+    optional,
+    to_path,
+    to_project,
+    to_some_texts,
+)
 from language.text.diagnostic import Problems
 from language.text.document import Document, ScalarNode, read_text
 from language.text.node_edit import find_node, mapping_entries
@@ -28,9 +36,9 @@ HEADINGS = ("name", "id", "requirement")
 
 
 def trace(
-    specs: Sequence[str],
-    listed: Path | None = None,
-    root: Path | None = None,
+    specs: PathTexts,
+    listed: PathText | None = None,
+    root: PathText | None = None,
     *,
     run: bool = False,
 ) -> RequirementTrace:
@@ -39,10 +47,10 @@ def trace(
     A system includes the automata of its instances and their models. Only tests that run one of
     these specs count. `listed` is a CSV file of requirements with texts, which come first and are
     included if nothing names them. With `run` the tests are run on engine and C; else they have no
-    verdicts. Raises SpecError and MissingToolError.
+    verdicts. Raises SpecError, MissingToolError, and ValueError without a spec.
     """
-    project = Project(root or Path())
-    documents = _load_documents(specs, project)
+    project, requirements = to_project(root), optional(to_path, listed, "listed")
+    documents = _load_documents(to_some_texts(specs, "specs"), project)
     expanded_documents = [_expand_with_instances(document, project) for document in documents]
     names = {
         name
@@ -55,7 +63,7 @@ def trace(
     verdicts = [_run_expectations(test) if run else {} for test in tests]
     code = _generate_code(documents, project)
     return trace_requirements(
-        expanded_documents, code, zip(tests, verdicts, strict=True), read_requirements(listed)
+        expanded_documents, code, zip(tests, verdicts, strict=True), read_requirements(requirements)
     )
 
 
@@ -68,15 +76,16 @@ class KeyTraceReport:
     code: dict[str, str]
 
 
-def trace_keys(specs: Sequence[str], root: Path | None = None) -> KeyTraceReport:
+def trace_keys(specs: PathTexts, root: PathText | None = None) -> KeyTraceReport:
     """Return the lines of C that come from each key of the specs.
 
     A system includes the automata of its instances and their models; an automaton alone only its
-    own C. The texts of ha_math are left out of `code`. Raises SpecError.
+    own C. The texts of ha_math are left out of `code`. Raises SpecError, and ValueError without a
+    spec.
     """
-    project = Project(root or Path())
-    documents = _load_documents(specs, project)
-    named = {read_document(project.path_of(spec)).name for spec in specs}
+    project, references = to_project(root), to_some_texts(specs, "specs")
+    documents = _load_documents(references, project)
+    named = {read_document(project.path_of(reference)).name for reference in references}
     expanded_documents = [_expand_with_instances(document, project) for document in documents]
     systems = {document.name for document in expanded_documents if document.kind == "system"}
     selected = documents if named & systems else [d for d in documents if d.name in named]

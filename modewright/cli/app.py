@@ -132,6 +132,8 @@ def options(
     ] = False,
 ) -> None:
     """Hybrid automata in YAML: simulate them, generate C code, keep both in lock-step."""
+    if quiet and verbose:
+        raise typer.BadParameter("leave out one of them", param_hint="--quiet, --verbose")
     require_writable(log_file)
     configure(quiet, verbose, log_file)
     if allow_outside:

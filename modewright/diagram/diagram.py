@@ -8,9 +8,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 from language.readers.transition_table_reader import expand_transition_tables
+from language.text.arguments import PathText, to_project, to_text
 from language.text.diagnostic import Problems
 from language.text.document import Document, Entry, MappingNode, SequenceNode, YamlNode
 from language.text.overlay import apply_overlay, without_keys
@@ -189,15 +189,15 @@ def _resolve_target(name: ModePath, path: ModePath, known: set[ModePath]) -> Mod
     return None
 
 
-def graph(reference: str, root: Path | None = None) -> Diagram:
+def graph(reference: PathText, root: PathText | None = None) -> Diagram:
     """Return the diagram of an automaton given by name or path, as the expanded spec writes it.
 
     Raises SpecError with all its problems if it is no valid automaton.
     """
     from language.loading.load import automaton_of
-    from language.overlays.expand_document import Project, expand_document, read_document
+    from language.overlays.expand_document import expand_document, read_document
 
-    project = Project(root or Path())
-    document = read_document(project.path_of(reference))
+    project = to_project(root)
+    document = read_document(project.path_of(to_text(reference, "reference")))
     automaton_of(document, project)
     return diagram_of(expand_document(document, project))

@@ -1,4 +1,4 @@
-"""Boxes: the elements of a diagram - regions, modes and transitions."""
+"""Diagram elements: the elements of a diagram - regions, modes and transitions."""
 
 from __future__ import annotations
 

@@ -5,8 +5,9 @@ Columns are counted in code units of the encoding that was agreed with the edito
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
-from urllib.parse import unquote, urlparse
+from urllib.parse import unquote, urlsplit
 
 from lsprotocol import types
 
@@ -49,11 +50,17 @@ def source_text(span: Span) -> str:
 
 
 def path_of(uri: str) -> Path:
-    """Return the resolved path of a file URI.
+    """Return the resolved path of a `file:` URI, with percent escapes decoded.
 
-    Percent escapes are decoded; the scheme is ignored.
+    A URI of another scheme, like `untitled:` or `git:`, gives a path below a folder that has the
+    name of the scheme, at which there is no file. So its text does not replace that of a file.
     """
-    return Path(unquote(urlparse(uri).path)).resolve()
+    parts = urlsplit(uri)
+    if parts.scheme != "file":
+        rest = unquote(uri.removeprefix(f"{parts.scheme}:")).lstrip("/")
+        return (Path(os.sep) / f"{parts.scheme}:" / rest).resolve()
+    path = unquote(parts.path)
+    return Path(path.removeprefix("/") if os.name == "nt" else path).resolve()  # nt: `/C:/...`
 
 
 def uri_of(path: Path) -> str:

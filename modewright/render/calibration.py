@@ -107,7 +107,7 @@ def page_json(page: CalibrationPage) -> dict[str, Any]:
         "numbers": page.program.number_type,
         "tunable": {
             page_name(page.program, c): {
-                "value": _constant_value(page, c),
+                "value": _constant_value(c),
                 "unit": display_unit(c.unit),
             }
             for c in page.tunable
@@ -177,7 +177,7 @@ def _remarks_json(remarks: Sequence[Remark]) -> list[dict[str, Any]]:
     ]
 
 
-def _constant_value(page: CalibrationPage, constant: Constant) -> Any:
+def _constant_value(constant: Constant) -> Any:
     """Return the value of a parameter: number, word, or list of a table."""
     if constant.items:
         return list(constant.items)

@@ -1,4 +1,4 @@
-"""Code output: print proofs, fuzzing and MC/DC of generated C."""
+"""Code verification: print proofs, fuzzing and MC/DC of generated C."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ from modewright.runtime.json_format import format_entry
 def print_proofs(console: Console, proofs: Sequence[ToolVerdict]) -> None:
     """Print a table with a row for each check, then each finding in a line `check: finding`.
 
-    A check that was not run is `not asked`, one without findings has `nothing`.
+    A row has the check, its tool, `about` and the number of findings, or `nothing` without any. A
+    check that does not apply (`is_asked` is false) has `not asked` instead of the number; findings
+    of it are listed all the same.
     """
     table = Table(box=None, pad_edge=False)
     for title in ("check", "tool", "of", "found"):

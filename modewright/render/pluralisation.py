@@ -1,4 +1,4 @@
-"""Text: format numbers with nouns."""
+"""Pluralisation: format numbers with nouns."""
 
 from __future__ import annotations
 

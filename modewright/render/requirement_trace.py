@@ -1,4 +1,4 @@
-"""Trace output: show requirements with specs, C and tests as text, CSV, HTML and JSON."""
+"""Requirement trace: show requirements with specs, C and tests as text, CSV, HTML and JSON."""
 
 from __future__ import annotations
 

@@ -158,8 +158,9 @@ def _instructions_json(verdict: Verdict) -> dict[str, Any] | None:
 def replay_json(replayed: Replayed) -> dict[str, Any]:
     """Return a replay as a dict for JSON.
 
-    It has the keys of `trajectory_json`, innovation_rms, comparisons, columns_left_out and lockstep
-    (the verdict, None without C).
+    It has the keys and values of `trajectory_json`, but `format` is that of a replay
+    (`modewright-replay/...`). In addition it has innovation_rms, comparisons, columns_left_out and
+    lockstep (the verdict, None without C).
     """
     return {
         **trajectory_json(replayed.result.trajectory),

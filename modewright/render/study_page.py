@@ -7,7 +7,6 @@ import itertools
 import re
 from collections.abc import Mapping, Sequence
 from importlib import metadata
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ import numpy as np
 from codegen.toolchain.templates import render_html
 from diagnosis import report as diagnosis_report
 from language.expressions.units import display_unit
+from language.text.arguments import PathText, to_path
 from modewright.render.sensitivity import DESIGN_UNITS, incomplete_index_notes, sort_indices
 from modewright.render.study import failure_texts, format_number, interval_text
 from sweep.analysis.plots import draw_pictures
@@ -230,10 +230,10 @@ def _render_template(context: Mapping[str, Any]) -> str:
     return render_html(packages, "study.html.jinja", context)
 
 
-def study_report(out: str | Path) -> bytes:
+def study_report(out: PathText) -> bytes:
     """Return the results in the folder of a study as a self-contained HTML page.
 
     No file is written. Raises SpecError if the folder has no results or a damaged block, and
     MissingToolError without pyarrow.
     """
-    return render_study_page(read_store(Path(out)))
+    return render_study_page(read_store(to_path(out, "out")))

@@ -1,4 +1,4 @@
-"""Compiled run: run simulations and batches in C, or in the interpreter without a compiler.
+"""Back end choice: run simulations and batches in C, or in the interpreter without a compiler.
 
 Both have the same bits. The results name the back end, with the reason for the interpreter.
 """
@@ -41,7 +41,7 @@ def run_simulation(
     steps on. Without a compiler, after a failed build and for a run that stops in C the interpreter
     runs it. The name is `compiled`, `compiled, block by block: reason` or `interpreter: reason`.
     """
-    scenario = resolve_recording(system, scenario)
+    scenario = resolve_recording(scenario)
     programs = programs_of(system, scenario)
     count = _count_steps(scenario, programs)
     if compiled is False or (compiled is None and count < COMPILE_THRESHOLD):
@@ -62,7 +62,7 @@ def run_in_c(system: System, scenario: Scenario) -> tuple[Trajectory, str]:
     The text is `compiled`, or `compiled, block by block: reason` for a run that cannot be planned
     as a whole or that stops. Raises MissingToolError and BuildError.
     """
-    scenario = resolve_recording(system, scenario)
+    scenario = resolve_recording(scenario)
     programs = programs_of(system, scenario)
     trajectory, reason = _simulate_in_c(system, scenario, programs)
     if trajectory:

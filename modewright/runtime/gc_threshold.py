@@ -1,4 +1,4 @@
-"""Garbage collection: run the collector less often, because expression trees have no cycles."""
+"""GC threshold: run the collector less often, because expression trees have no cycles."""
 
 from __future__ import annotations
 

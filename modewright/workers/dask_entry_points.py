@@ -1,4 +1,4 @@
-"""Dask worker: functions that Dask calls by name in a worker process.
+"""Dask entry points: functions that Dask calls by name in a worker process.
 
 The module imports the packages of this installation, independent of the working folder.
 """
@@ -35,6 +35,6 @@ def own_fingerprint() -> Mapping[str, str]:
     return fingerprint()
 
 
-def dask_setup(worker: object) -> None:
+def dask_setup(_worker: object) -> None:
     """Ignore Ctrl-C in the worker; the parent process ends it. Dask calls this at the start."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,4 +1,4 @@
-"""Dask template: modules that the fork server loads for local Dask workers.
+"""Preloaded modules: modules that the fork server loads for local Dask workers.
 
 If a package is missing, the fork server continues without this module and the client reports it.
 """

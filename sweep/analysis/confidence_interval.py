@@ -18,10 +18,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.results.array_types import Reals
 from sweep.evaluation.exact_moments import quantiles_of, scale_to_squarable, undo_scale
 
 Interval = tuple[float, float] | None
-Reals = NDArray[np.float64]
 DrawIndices = NDArray[np.int64]
 
 

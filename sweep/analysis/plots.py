@@ -12,13 +12,14 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from engine.results.array_types import Reals
 from engine.results.mode_band import PALETTE
 from engine.results.plot import QUANTITIES, Picture
 from language.text.sanitise import escape_invisible
 from sweep.analysis.summary import group_values
 from sweep.definition.measure import StoreColumn
 from sweep.store.store import Store
-from sweep.store.table import Reals, StudyTable, to_display_unit
+from sweep.store.table import StudyTable, to_display_unit
 
 RELATIVE_ROUNDING = 1.0e-9
 """Relative range of values below which a histogram has one bin. It is larger than rounding errors.

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.results.array_types import Reals
 from sweep.analysis.confidence_interval import Interval
 from sweep.analysis.summary import group_values
 from sweep.definition.measure import StoreColumn
@@ -25,7 +26,7 @@ from sweep.design.sensitivity_design import STRIDE, morris_points
 from sweep.evaluation.exact_moments import scale_to_squarable
 from sweep.store.manifest import Design, store_error
 from sweep.store.store import Store
-from sweep.store.table import Reals, StudyTable
+from sweep.store.table import StudyTable
 
 BOOTSTRAP_REPLICATES = 500
 """Replicates of the bootstrap: about a dozen lie beyond each end of a 95 % interval."""
@@ -122,7 +123,7 @@ def sensitivity_of(store: Store) -> Sensitivity:
     if not design.has_indices:
         label = f"the points of `{manifest.study}` are no design of which indices are made"
         hint = "draw them by `sampling: {saltelli: 256, seed: 1}`, or fewer by `{morris: 50}`"
-        raise store_error(store.folder, "store", label, hint)
+        raise store_error(store.folder, label, hint)
     table = StudyTable(store)
     groups = list(_design_groups(table, design))
     found = [

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.results.array_types import Reals
 from sweep.analysis.confidence_interval import (
     Interval,
     interval_of_mean,
@@ -27,7 +28,7 @@ from sweep.analysis.confidence_interval import (
 from sweep.definition.measure import StoreColumn
 from sweep.evaluation.exact_moments import deviation_of, mean_of, quantiles_of, total_of
 from sweep.store.store import Store
-from sweep.store.table import Reals, StudyTable, to_display_unit
+from sweep.store.table import StudyTable, to_display_unit
 
 NUMBER_PATTERN = re.compile(r"(?<![\w.])-?\d+(\.\d+)?([eE][-+]?\d+)?(?![\w.]*`)")
 """A number in a message. Messages that differ in numbers only belong to one reason of failure."""
@@ -63,7 +64,8 @@ def failures_of(table: StudyTable) -> tuple[Failure, ...]:
     pairs, firsts, counts = np.unique(reasons, axis=0, return_index=True, return_counts=True)
     own = numbers[~table.is_done]
     for (state, text), first, count in sorted(
-        zip(pairs.tolist(), own[firsts].tolist(), counts.tolist(), strict=True), key=_first_number
+        zip(pairs.tolist(), own[firsts].tolist(), counts.tolist(), strict=True),
+        key=lambda row: row[1],
     ):
         key = names[state], NUMBER_PATTERN.sub("#", messages[text])
         known = failures.get(key)
@@ -71,11 +73,6 @@ def failures_of(table: StudyTable) -> tuple[Failure, ...]:
         message = known.message if known else messages[text]
         failures[key] = Failure(key[0], message, count + (known.count if known else 0), number)
     return tuple(sorted(failures.values(), key=lambda one: (-one.count, one.number)))
-
-
-def _first_number(row: tuple[list[int], int, int]) -> int:
-    """Return the number of the first variant of a row, the key of the sort."""
-    return row[1]
 
 
 RATE_DENOMINATORS = {"missed": "truths", "first_missed": ""}

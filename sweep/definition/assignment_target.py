@@ -1,4 +1,5 @@
-"""Targets: find the places of a system and its scenarios to which a study can assign values."""
+"""Assignment target: find the places of a system and its scenarios to which a study can assign
+values."""
 
 from __future__ import annotations
 

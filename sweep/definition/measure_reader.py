@@ -141,16 +141,7 @@ class MeasureReader(Reader):
             label = f"`{node.text}` is not an earlier measure that is a time"
             self.problems.error("name", node.span, label, suggest_name(node.text, self.dimensions))
             return None
-        return self._time(node, what)
-
-    def _time(self, node: YamlNode | None, what: str) -> Fraction:
-        """Return a time [s] that is not negative; 0 without a node. Reports other quantities."""
-        if node is None:
-            return Fraction(0)
-        value, unit = self.read_quantity(node, what, node.span, None)
-        if value < 0 or (value and not are_compatible(unit.dimension, SECOND)):
-            self.problems.error("range", node.span, f"`{what}` is a time, like `15 ms`")
-        return value
+        return self.read_duration(node, what)
 
     def _event(
         self,
@@ -180,8 +171,8 @@ class MeasureReader(Reader):
         truth = self._event_name(other) if other else None
         if truth is None:
             return None
-        before = self._time(own.get("before"), "before")
-        within = self._time(own.get("within"), "within") if own.get("within") else None
+        before = self.read_duration(own.get("before"), "before")
+        within = self.read_duration(own.get("within"), "within") if own.get("within") else None
         if kind == "match":
             return MatchMeasure(
                 entry.key, event, truth, before, within, since, until, "s", entry.span

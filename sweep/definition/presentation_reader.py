@@ -15,7 +15,6 @@ from sweep.definition.study import (
     Axis,
     Presentation,
     SweepVariable,
-    SystemVariant,
 )
 
 PLOT_OPTIONS: dict[str, tuple[str, ...]] = {
@@ -33,7 +32,6 @@ class PresentationReader(Reader):
     def __init__(
         self,
         problems: Problems,
-        system_variants: Sequence[SystemVariant],
         varied: Sequence[SweepVariable],
         measures: Sequence[Measure],
     ) -> None:
@@ -46,7 +44,6 @@ class PresentationReader(Reader):
         columns = [column for measure in measures for column in columns_of(measure)]
         self.columns = [column.name for column in columns]
         self.numbers = [column.name for column in columns if column.type != "list"]
-        self.is_plural = len(system_variants) > 1
         self.example = self.numbers[0] if self.numbers else "late"
 
     def presentation(self, summary: YamlNode | None, plots: YamlNode | None) -> Presentation:

@@ -109,12 +109,12 @@ class _StudyReader(Reader):
         system_variants = tuple(
             SystemVariant(
                 name,
-                _with_measure_outputs(system, measures, checked_measures),
+                _with_measure_outputs(system, measures),
                 _bind_scenarios(scenarios_by_system[name], scenarios, parts),
             )
             for name, system in systems.items()
         )
-        shown = PresentationReader(self.problems, system_variants, varied, checked_measures)
+        shown = PresentationReader(self.problems, varied, checked_measures)
         study = Study(
             name=document.name,
             system_variants=system_variants,
@@ -283,9 +283,7 @@ def _has_input_targets(variables: tuple[SweepVariable, ...], settings: tuple[Set
     return any(target.kind == "input" for target in targets)
 
 
-def _with_measure_outputs(
-    system: System, reader: MeasureReader, measures: tuple[Measure, ...]
-) -> System:
+def _with_measure_outputs(system: System, reader: MeasureReader) -> System:
     """Return the system with the expressions of the measures as additional outputs."""
     outputs, dimensions = dict(system.outputs), dict(system.dimensions)
     for name, (formula, dimension) in reader.expressions.items():

@@ -136,7 +136,7 @@ class VaryReader(Reader):
             return self._axis(numbers, entry.span, problem_count), unit
         within = self._truncation(table.get("within"), unit, form, place)
         weights = tuple(float(w) for w in self._plain_numbers(table.get("weights"), "weights"))
-        shape = Distribution(form, tuple(map(_to_float, numbers)), within, weights)  # type: ignore[arg-type]
+        shape = Distribution(form, tuple(map(float, numbers)), within, weights)  # type: ignore[arg-type]
         if len(self.problems.reported) == problem_count:
             fault = fault_of_distribution(shape)
             if fault:
@@ -148,7 +148,7 @@ class VaryReader(Reader):
         """Return an axis; report duplicate values unless an earlier problem was reported."""
         if len(set(numbers)) < len(numbers) and len(self.problems.reported) == problem_count:
             self.problems.error("duplicate", span, "a value stands in the list twice")
-        return Axis(tuple(map(_to_float, numbers)))
+        return Axis(tuple(map(float, numbers)))
 
     def _numbers(
         self, node: YamlNode | None, what: str, unit: Unit | None, place: TargetInfo | None
@@ -206,7 +206,7 @@ class VaryReader(Reader):
                 return None, unit
             return Axis(log_spaced(first, last, count)), unit
         steps = [first + (last - first) * Fraction(k, count - 1) for k in range(count)]
-        return Axis(tuple(map(_to_float, steps))), unit
+        return Axis(tuple(map(float, steps))), unit
 
     def _plain_numbers(self, node: YamlNode | None, what: str) -> list[Fraction]:
         """Return numbers without a unit; reports those with a unit."""
@@ -232,7 +232,7 @@ class VaryReader(Reader):
             assert node is not None
             label = f"`within` cuts a normal or lognormal; `{form}` has its ends"
             self.problems.error("form", node.span, label)
-        return (_to_float(limits[0]), _to_float(limits[1])) if limits else None
+        return (float(limits[0]), float(limits[1])) if limits else None
 
     def settings(
         self, node: YamlNode | None, variables: Sequence[SweepVariable]
@@ -283,8 +283,3 @@ class VaryReader(Reader):
 def _is_discrete(distribution: Axis | Distribution) -> bool:
     """Return whether a variable has a finite list of values."""
     return isinstance(distribution, Axis) or distribution.shape == "choice"
-
-
-def _to_float(value: Fraction) -> float:
-    """Return the nearest float of a fraction."""
-    return value.numerator / value.denominator

@@ -6,7 +6,6 @@ Latin hypercubes and scrambled Sobol sequences come from scipy.stats.qmc.
 
 from __future__ import annotations
 
-import hashlib
 import warnings
 from collections.abc import Sequence
 from functools import lru_cache
@@ -15,11 +14,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.results.array_types import Reals
+from engine.simulation.sensors import philox_of
 from sweep.definition.study import TIME_DECIMALS, Distribution, Study, design_group_size
 from sweep.definition.truncation import truncation_levels
 from sweep.design.sensitivity_design import morris_points, saltelli_points
-
-Reals = NDArray[np.float64]
 
 NUMBERS_PER_COUNTER = 4
 """Numbers that Philox 4x64 generates for one counter value."""
@@ -106,9 +105,7 @@ def _random_stream(seed: int, name: str, first: int, count: int) -> Reals:
     """Return the numbers `first` to `first + count` (exclusive) of the stream of a variable
     name.
     """
-    digest = hashlib.sha256(name.encode()).digest()
-    key = np.array([seed, int.from_bytes(digest[:8], "little")], dtype=np.uint64)
-    source = np.random.Philox(key=key).advance(first // NUMBERS_PER_COUNTER)
+    source = philox_of(seed, name).advance(first // NUMBERS_PER_COUNTER)
     skipped = first % NUMBERS_PER_COUNTER
     numbers = np.random.Generator(source).random(skipped + count)[skipped:]
     return np.asarray(numbers + OPEN_UNIT_MARGIN)

@@ -10,9 +10,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.results.array_types import Reals
 from sweep.definition.study import MORRIS_LEVELS
 
-Reals = NDArray[np.float64]
 STRIDE = MORRIS_LEVELS // 2
 """Levels of one step of a Morris path, half of all, so that all levels are equally frequent."""
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from language.loading.scenario_reader import read_scenario
 from language.model.system import Scenario, System
 from language.overlays.expand_document import Project
-from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
+from language.text.document import Entry, MappingNode, ScalarNode
 from language.text.node_edit import find_node, put_node
 from sweep.definition.study import TIME_DECIMALS, ScenarioBinding, Target
 
@@ -96,14 +96,9 @@ def _with_point(table: MappingNode, number: int, text: str, is_time: bool) -> Ma
         key, node = entry.key, entry.node
         if place == number:
             key = text if is_time else key
-            node = node if is_time else _scalar(node, text)
+            node = node if is_time else ScalarNode(text, node.span)
         made[key] = Entry(key, entry.span, node)
     return MappingNode(made, table.span)
-
-
-def _scalar(node: YamlNode, text: str) -> ScalarNode:
-    """Return a scalar node with a text at the place of another node."""
-    return ScalarNode(text, node.span)
 
 
 def format_decimal(value: float) -> str:

@@ -10,9 +10,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-Reals = NDArray[np.float64]
+from engine.results.array_types import Reals
+
 SQUARABLE_LIMIT = 2.0**480
 """Values of smaller magnitude have squares of which 2**63 can be added without overflow."""
 

@@ -1,17 +1,13 @@
-"""Observation: the mode changes and the recorded signals of one run, the input of measures."""
+"""Observed variant: the mode changes and the recorded signals of one run, the input of measures."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from engine.batch.batch import NO_EVENT, BatchResult, EventKind
+from engine.results.array_types import Reals
 from language.loading.mode_entry_event import ModeEntryEvent
-
-Reals = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from engine.results.array_types import Reals
 from sweep.definition.measure import SignalMeasure
 from sweep.evaluation.exact_moments import mean_of, root_mean_square, scale_to_squarable
 
-Reals = NDArray[np.float64]
 MIN_SPECTRUM_ROWS = 8
 """Smallest number of samples of a spectrum."""
 FLATNESS_TOLERANCE = 1.0e-12

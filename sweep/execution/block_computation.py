@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 
 import numpy as np
 
@@ -178,7 +177,7 @@ def _build_input_tables(group: _BatchGroup) -> dict[str, InputTable]:
         pieces = [scenario.inputs[name].pieces for scenario in group.scenarios]
         if any(each != pieces[0] for each in pieces):
             starts = tuple(piece.start for piece in stimulus.pieces)
-            values = np.array([[_to_float(piece.value) for piece in each] for each in pieces])
+            values = np.array([[float(piece.value) for piece in each] for each in pieces])
             found[name] = InputTable(starts, values)
     return found
 
@@ -194,11 +193,6 @@ def _share_step_times(group: _BatchGroup) -> bool:
         for scenario in group.scenarios
         for name, stimulus in group.scenario.inputs.items()
     )
-
-
-def _to_float(value: Fraction) -> float:
-    """Return the nearest float of a fraction."""
-    return value.numerator / value.denominator
 
 
 def _row_of_result(study: Study, group: _BatchGroup, result: BatchResult, place: int) -> Row:

@@ -29,7 +29,7 @@ def prepare_study(study: Study) -> Study:
     for kind in study.system_variants:
         courses = {}
         for name, course in kind.scenario_bindings.items():
-            scenario = _with_row_period(study, resolve_recording(kind.system, course.scenario))
+            scenario = _with_row_period(study, resolve_recording(course.scenario))
             courses[name] = ScenarioBinding(scenario, course.document)
             identity |= _recording_digest(name, scenario)
         kinds.append(SystemVariant(kind.name, kind.system, courses))

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from language.text.diagnostic import Problems, Source, Span, SpecError
+from language.text.diagnostic import Problem, Source, Span, SpecError
 from sweep.definition.description import Description
 from sweep.definition.measure import StoreColumn, columns_of
 from sweep.definition.study import Presentation, Study, SweepVariable, design_group_size
@@ -178,14 +178,12 @@ def seal_of(data: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
 
 
-def store_error(folder: Path, kind: str, label: str, help: str = "") -> SpecError:
+def store_error(folder: Path, label: str, help: str = "") -> SpecError:
     """Return a SpecError about a folder, for the caller to raise.
 
-    It has one error of the given kind, at line 1 of the folder's path, with a label and a hint.
+    It has one error of the kind `store`, at line 1 of the folder's path, with a label and a hint.
     """
-    problems = Problems()
-    problems.error(kind, file_span(folder), label, help)
-    return SpecError(problems.reported)
+    return SpecError([Problem("store", file_span(folder), label, help)])
 
 
 def file_span(path: Path) -> Span:

@@ -36,15 +36,15 @@ def read_manifest(folder: Path) -> Manifest:
         data = json.loads((folder / MANIFEST_NAME).read_text("utf-8"))
         if isinstance(data, dict) and data.get("modewright", STORE_FORMAT) != STORE_FORMAT:
             label = "these results are in a form that is not known here"
-            raise store_error(folder, "store", label, "run the study into another folder")
+            raise store_error(folder, label, "run the study into another folder")
         return _manifest(data)
     except FileNotFoundError:
         label = "there are no results of a study here"
-        raise store_error(folder, "store", label, "modewright sweep STUDY --out DIR") from None
+        raise store_error(folder, label, "modewright sweep STUDY --out DIR") from None
     except (OSError, ValueError, RecursionError) as error:
         label = f"`{MANIFEST_NAME}` cannot be read: {error}"
         hint = "put back what modewright has written; the blocks are as they were"
-        raise store_error(folder, "store", label, hint) from None
+        raise store_error(folder, label, hint) from None
 
 
 def _manifest(data: Any) -> Manifest:

@@ -87,7 +87,7 @@ class Store:
             names = sorted(path.name for path in (self.folder / BLOCKS_FOLDER).iterdir())
         except (FileNotFoundError, NotADirectoryError):
             label = f"the folder `{BLOCKS_FOLDER}` is missing, and with it the results"
-            raise store_error(self.folder, "store", label, RERUN_HINT) from None
+            raise store_error(self.folder, label, RERUN_HINT) from None
         for name in names:
             match = BLOCK_NAME.fullmatch(name)
             if match:
@@ -186,7 +186,7 @@ def require_same_study(folder: Path, manifest: Manifest) -> Manifest | None:
         p.name != LOCK_NAME and p.suffix != ".part" for p in folder.iterdir()
     ):
         label = "this folder holds something else than the results of a study"
-        raise store_error(folder, "store", label, "name another folder, or a new one")
+        raise store_error(folder, label, "name another folder, or a new one")
     return None
 
 
@@ -224,9 +224,7 @@ def lock_folder(folder: Path) -> Iterator[None]:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             label = "another process is writing into this folder"
-            raise store_error(
-                folder, "store", label, "wait for it, or name another folder"
-            ) from None
+            raise store_error(folder, label, "wait for it, or name another folder") from None
         try:
             yield
         finally:  # explicit: a child process may still share the file
@@ -239,4 +237,4 @@ def _changed_study_error(folder: Path, found: Manifest, expected: Manifest) -> S
     other = [n for n in names if found.identity.get(n) != expected.identity.get(n)]
     parts = f"{', '.join(other[:3])}{' ...' if len(other) > 3 else ''}"
     label = f"the results here are of another state of `{found.study}`: {parts} changed"
-    return store_error(folder, "store", label, "name another folder with --out, or undo the change")
+    return store_error(folder, label, "name another folder with --out, or undo the change")

@@ -9,12 +9,12 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.results.array_types import Reals
 from sweep.definition.measure import StoreColumn
 from sweep.store.block_file import import_arrow
 from sweep.store.row import DONE
 from sweep.store.store import Store
 
-Reals = NDArray[np.float64]
 Values = TypeVar("Values", float, Reals)
 
 

@@ -61,7 +61,7 @@ class PreparedRun:
 
     def compiled(self) -> CompiledRun:
         """Return the run in compiled C, which can be carried out again and again."""
-        scenario = resolve_recording(self.system, self.scenario)
+        scenario = resolve_recording(self.scenario)
         return CompiledRun(self.system, scenario, self.programs, load_library)
 
 

@@ -22,8 +22,8 @@ from language.text.diagnostic import Problems
 
 ROOT = Path(__file__).parents[2]
 PAPER = ROOT / "tests/data/paper"
-TWIN = ROOT / "tests/data/synthetic_leaf/drive_twin.csv"
-TWIN_SCRIPT = ROOT / "tests/data/synthetic_leaf/make_synthetic_recording.py"
+TWIN = ROOT / "tests/data/synthetic_nissan_leaf/drive_twin.csv"
+TWIN_SCRIPT = ROOT / "tests/data/synthetic_nissan_leaf/make_synthetic_recording.py"
 ESTIMATORS = ("estimator", "estimator_simple")
 
 Moment = tuple[int, int, int]

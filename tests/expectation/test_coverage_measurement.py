@@ -84,7 +84,7 @@ def test_what_tests_reach_is_summed(tmp_path: Path) -> None:
 
 def test_probes_change_no_bit_of_a_run_and_each_guard_has_one() -> None:
     test = tests.load_test("tip_in_crosses_the_gap", ROOT)
-    scenario = resolve_recording(test.system, test.scenario)
+    scenario = resolve_recording(test.scenario)
     decisions, programs, arrays = instrument_programs(automata_of(test.system, scenario))
     plain = simulate(test.system, scenario)
     with_probes = simulate(test.system, scenario, programs=programs)

@@ -41,11 +41,11 @@ class _ReadContext:
     name_filter: NameFilter
 
 
-def format_csv(title: str, heading: Sequence[str], page: Sequence[FileCharacteristic]) -> str:
+def format_csv(_title: str, _heading: Sequence[str], page: Sequence[FileCharacteristic]) -> str:
     """Return a page as CSV with the header COLUMNS and one line for each value.
 
-    The separator is a comma. Cells of absent units and axes are empty. `title` and `heading` are
-    ignored, because CSV has no comments.
+    The separator is a comma. Cells of absent units and axes are empty. The title and the
+    heading are ignored, because CSV has no comments.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-import stat
 from pathlib import Path
 
-from language.text.diagnostic import Problems, Source, Span, SpecError
+from language.text.diagnostic import Problem, Source, Span, SpecError
+from language.text.document import decode_utf8, read_regular_file
 
 MAX_BYTES = 8 * 1024 * 1024
 """Largest file that is read [bytes]; the page of a large automaton has about 100 kB."""
@@ -24,26 +24,10 @@ def read_bytes(path: Path, display_name: str) -> bytes:
     Raises SpecError for a path that is no readable regular file, for a file larger than MAX_BYTES,
     and for one that is empty or only white space.
     """
-    place = Span(Source(display_name), 1, 1)
-    problems = Problems()
-    data = b""
-    try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            label = "the file cannot be read: it is a folder, a pipe or a device"
-            problems.error("unreadable", place, label)
-        elif status.st_size > MAX_BYTES:
-            label = f"the file has {status.st_size} bytes; a page has at most {MAX_BYTES}"
-            problems.error("huge", place, label)
-        else:
-            data = path.read_bytes()
-            if not data.strip():
-                problems.error("empty", place, "the file is empty")
-    except OSError as error:
-        problems.error("unreadable", place, f"the file cannot be read: {error.strerror}")
-    except ValueError:
-        problems.error("unreadable", place, "this is not the name of a file")
-    problems.raise_if_errors()
+    data = read_regular_file(path, display_name, MAX_BYTES, "a page")
+    if not data.strip():
+        place = Span(Source(display_name), 1, 1)
+        raise SpecError([Problem("empty", place, "the file is empty")])
     return data
 
 
@@ -56,25 +40,19 @@ def decode_text(
     not None. Raises SpecError for UTF-16 (by its byte order mark), undecodable bytes and
     CONTROL_CHARACTERS. Any of CR LF, CR and LF ends a line; the text keeps them.
     """
-    problems = Problems()
     if data.startswith(UTF16_BOM):
         place = Span(Source(display_name), 1, 1)
-        problems.error("binary", place, "this is UTF-16", "save it as UTF-8")
-        problems.raise_if_errors()
+        raise SpecError([Problem("binary", place, "this is UTF-16", "save it as UTF-8")])
     try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
+        text = decode_utf8(data, display_name)
+    except SpecError:
         if fallback_encoding is None:
-            line = data.count(b"\n", 0, error.start) + 1
-            place = Span(Source(display_name), line, 1)
-            problems.error("binary", place, "this is not UTF-8 text", "save it as UTF-8")
-            raise SpecError(problems.reported) from None
+            raise
         text = data.decode(fallback_encoding)
     control_character = CONTROL_CHARACTERS.search(text)
     if control_character:
         line = len(LINE_END.findall(text, 0, control_character.start())) + 1
         place = Span(Source(display_name), line, 1)
         label = f"this is no text: it holds the character {ord(control_character[0])}"
-        problems.error("binary", place, label)
-        problems.raise_if_errors()
+        raise SpecError([Problem("binary", place, label)])
     return Source(display_name, tuple(LINE_END.split(text))), text

@@ -1,4 +1,4 @@
-"""Import context: converts values of a file to those of a parameter, with remarks."""
+"""Value conversion: converts values of a file to those of a parameter, with remarks."""
 
 from __future__ import annotations
 

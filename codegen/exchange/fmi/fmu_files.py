@@ -1,4 +1,4 @@
-"""FMU content: the files of an FMU: model description, sources, and headers of the standard."""
+"""FMU files: the files of an FMU: model description, sources, and headers of the standard."""
 
 from __future__ import annotations
 
@@ -36,7 +36,8 @@ def emit_fmu_files(program: Program, version: Version) -> dict[str, bytes]:
         known = " and ".join(map(str, VERSIONS))
         raise ValueError(f"there is no FMI {version}: versions are {known}")
     sources = {**emit_c_files(program), **emit_wrapper(program, version)}
-    context = {**fmu_context(program, version), "sources": _c_sources(sources)}
+    c_files = sorted(name for name in sources if name.endswith(".c"))
+    context = {**fmu_context(program, version), "sources": c_files}
     files = {f"sources/{name}": text.encode() for name, text in sources.items()}
     files |= {f"sources/{name}": data for name, data in read_headers(version).items()}
     files["modelDescription.xml"] = _render_bytes(f"fmi/description_{version}.xml.jinja", context)
@@ -96,11 +97,6 @@ def fmu_context(program: Program, version: Version) -> dict[str, Any]:
         "options": COMPILER_OPTIONS,
         "refusals": list(unsupported_functions(version)),
     }
-
-
-def _c_sources(sources: Mapping[str, str]) -> list[str]:
-    """Return the names of the C files in sorted order."""
-    return sorted(name for name in sources if name.endswith(".c"))
 
 
 def _render_bytes(template: str, context: Mapping[str, Any]) -> bytes:

@@ -125,7 +125,7 @@ def variables_of(program: Program, version: Version) -> tuple[FmuVariable, ...]:
         *_parameter_variables(program, version),
         *_output_variables(program, version),
         *_local_variables(program, version),
-        *_fault_variables(program, version),
+        *_fault_variables(program),
     ]
     return tuple(_make_names_unique(variables))
 
@@ -227,7 +227,7 @@ def _local_variables(program: Program, version: Version) -> Iterator[FmuVariable
         yield dataclasses.replace(made, name=name.removeprefix("memory."))
 
 
-def _fault_variables(program: Program, version: Version) -> Iterator[FmuVariable]:
+def _fault_variables(program: Program) -> Iterator[FmuVariable]:
     """Yield one boolean local for each fault bit."""
     for bit, fault in enumerate(program.faults):
         yield FmuVariable(

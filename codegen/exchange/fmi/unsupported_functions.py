@@ -1,4 +1,4 @@
-"""FMI standard: the functions of the headers that an FMU exports but does not support."""
+"""Unsupported functions: the functions of the headers that an FMU exports but does not support."""
 
 from __future__ import annotations
 

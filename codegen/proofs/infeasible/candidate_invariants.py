@@ -105,7 +105,7 @@ def propose_facts(
                     yield from (Within(cut, name, one, where) for one in some)
             for name, operator, end in asked if len(where) > 1 else ():
                 yield from (Same(cut, name, operator, end, t, where) for t in (True, False))
-        yield from _histories(program, cut)
+        yield from _histories(cut)
         if cut.loop:
             yield from _counts(program, cut, first)
 
@@ -247,7 +247,7 @@ def asked_of(program: Program, cut: Cutpoint) -> Iterator[tuple[str, str, float 
         yield name, operator, round_to_type(number, program.number_type) if is_real else number
 
 
-def _histories(program: Program, cut: Cutpoint) -> Iterator[Fact]:
+def _histories(cut: Cutpoint) -> Iterator[Fact]:
     left = [name for name in cut.names if name.startswith(LEFT)]
     for one in left:
         where = ((one, NEVER_LEFT),)

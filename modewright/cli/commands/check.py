@@ -47,6 +47,8 @@ def check(
     from modewright.api import spec_check as checking
     from modewright.cli.common.watch import spec_folders, watch_changes
 
+    if as_json and as_annotations:
+        raise typer.BadParameter("leave out one of them", param_hint="--json, --github")
     require_writable(sarif)
     if not (specs or every):
         raise typer.BadParameter("name a spec, or use --all", param_hint="SPECS")

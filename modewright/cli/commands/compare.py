@@ -59,7 +59,7 @@ def compare(
         first, second = runs.read(a), runs.read(b)
         found = runs.compare(
             first, second, relative=relative, tolerances=_parse_tolerances(tolerance),
-            slack=slack, signals=signals or (), span=span_of(start, end),
+            slack=slack, signals=signals or None, span=span_of(start, end),
         )  # fmt: skip
     if plot:
         from engine.results.comparison_plot import draw_difference

@@ -47,6 +47,9 @@ def fit(
     from modewright.api.diagnosis import UnusableRecordings, fit as fit_parameters
     from modewright.render import diagnosis as show_diagnosis, run as show
 
+    for option, is_used in (("--name", name is not None), ("--date", date)):
+        if is_used and out is None:
+            raise typer.BadParameter("goes with --out, the calibration", param_hint=option)
     title = calibration_name(out, name, date)
     chosen = names_of(parameters) if parameters is not None else None
     try:

@@ -26,11 +26,13 @@ def format(
     modewright format --check spec/plant.yaml
     """
     from language.text.document import read_text
+    from language.text.project_boundary import require_link_inside_project
     from modewright.editing.formatter import format_text
 
     paths = [path for file in files for path in _find_specs(file)]
     made: dict[Path, bytes] = {}
     for path in paths:
+        require_link_inside_project(path, str(path))
         read_text(path)  # raises SpecError for binary files
         before = path.read_bytes()
         data = format_text(before.decode(), str(path)).encode()

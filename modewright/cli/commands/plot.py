@@ -35,6 +35,6 @@ def plot(
     form = picture_format(out)
     require_writable(out)
     with usage_errors():
-        drawn = runs.plot(a, b, signals=signals or (), span=span_of(start, end))
+        drawn = runs.plot(a, b, signals=signals or None, span=span_of(start, end))
     write_files({out: drawn.data(form)})
     report_written_files([out])

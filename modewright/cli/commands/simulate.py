@@ -39,8 +39,9 @@ def simulate(
         bool, typer.Option("--reference", help="independent reference: scipy and filterpy")
     ] = False,
     method: Annotated[
-        str, typer.Option("--method", help="RK4, or DOP853, Radau, LSODA of scipy")
-    ] = "RK4",
+        str | None,
+        typer.Option("--method", help="RK4 (default), or DOP853, Radau, LSODA of scipy"),
+    ] = None,
     compiled: Annotated[
         bool | None,
         typer.Option(
@@ -58,6 +59,7 @@ def simulate(
     from engine.results.run_file import encode_run
     from modewright.api import simulation as api
 
+    _require_one_integration(reference, method, compiled)
     require_run_format(out)
     require_writable(out, plot)
     with progress_spinner(f"simulating {system}, {scenario}"), usage_errors():
@@ -66,7 +68,7 @@ def simulate(
             scenario,
             values_of(sets),
             reference=reference,
-            method=method,
+            method=method or "RK4",
             calibrations=calibrations or (),
             compiled=compiled,
         )
@@ -75,6 +77,21 @@ def simulate(
         files[plot] = _draw_plot(trajectory, f"{system}, scenario {scenario}", plot)
     write_files(files)
     _report_run(trajectory, list(files), as_json)
+
+
+def _require_one_integration(reference: bool, method: str | None, compiled: bool | None) -> None:
+    """Raise BadParameter for options of which one would have no effect.
+
+    C and interpreter integrate with RK4 only, and the reference with methods of scipy only.
+    """
+    if reference and method == "RK4":
+        label = "the reference integrates with scipy: leave out --method RK4 or --reference"
+        raise typer.BadParameter(label, param_hint="--method")
+    if compiled is not None and (reference or method not in (None, "RK4")):
+        option = "--compiled" if compiled else "--interpreted"
+        other = "--reference" if reference else f"--method {method}"
+        label = f"scipy integrates with {other}: leave out {option} or {other}"
+        raise typer.BadParameter(label, param_hint=option)
 
 
 def _report_run(trajectory: Trajectory, files: list[Path], as_json: bool) -> None:

@@ -56,7 +56,7 @@ def test(
     runs: list[TestRun] = []
     parts: list[Coverage] = []
     with progress_spinner("running tests"):
-        for run in run_tests(tests or (), compiled=not interpreted):
+        for run in run_tests(tests or None, compiled=not interpreted):
             runs.append(run)
             parts += measure_coverage(run.test) if coverage or graphs else ()
             _print_lines(() if as_json else spec_test_lines(run))

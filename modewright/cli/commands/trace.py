@@ -49,6 +49,13 @@ def trace(
     form = out.suffix.lower() if out else ""
     if out and form not in FORMATS:
         raise OutputError(f"{out}: a trace ends with {', '.join(FORMATS)}")
+    for option, is_used in (
+        ("--requirements", requirements is not None),
+        ("--run", run),
+        ("--strict", strict),
+    ):
+        if keys and is_used:
+            raise typer.BadParameter("leave it out: --keys has no requirements", param_hint=option)
     require_writable(out)
     if keys:
         _report_key_trace(specs, out, form, as_json)

@@ -7,10 +7,12 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from language.text.sanitise import escape_invisible
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -42,23 +44,41 @@ def configure(quiet: bool = False, verbose: bool = False, log_file: Path | None 
 
     `quiet` suppresses the output of the console. `verbose` writes the log to stderr; `log_file`
     appends it to a file with UTC times, beginning with the command. Without both the log is
-    discarded.
+    discarded. A log file that cannot be written gives one warning on stderr.
     """
     if quiet or console.cache_info().currsize:
         console().quiet = quiet
     for handler in list(log.handlers):
         log.removeHandler(handler)
-        handler.close()
+        with suppress(OSError):
+            handler.close()
     log.setLevel(logging.DEBUG if verbose or log_file else logging.WARNING)
     log.propagate = False
     if verbose:
         log.addHandler(_set_formatter(logging.StreamHandler(sys.stderr), "%(message)s"))
     if log_file:
-        file = logging.FileHandler(log_file, encoding="utf-8")
+        file = _LogFile(log_file, encoding="utf-8")
         log.addHandler(_set_formatter(file, "%(asctime)s %(levelname)s %(message)s"))
         log.debug("command: %s", " ".join(sys.argv))
     if not log.handlers:
         log.addHandler(logging.NullHandler())
+
+
+class _LogFile(logging.FileHandler):
+    """Log file that reports on stderr, once, that it cannot be written."""
+
+    has_failed = False
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        """Print a warning with the reason of the exception that is being handled."""
+        error = sys.exception()
+        if self.has_failed or not isinstance(error, OSError):
+            return
+        self.has_failed = True
+        name = escape_invisible(os.fspath(self.baseFilename))
+        reason = error.strerror or error
+        with suppress(OSError, ValueError):
+            print(f"warning: the log {name} is incomplete: {reason}", file=sys.stderr)
 
 
 @contextmanager

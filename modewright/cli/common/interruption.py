@@ -25,7 +25,7 @@ def debounce_interrupts() -> Iterator[None]:
         return
     first: list[float] = []
 
-    def interrupt(*given: object) -> None:
+    def interrupt(*_given: object) -> None:
         if first and time.monotonic() < first[0] + GRACE_PERIOD:
             return
         first[:] = [time.monotonic()]

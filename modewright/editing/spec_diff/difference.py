@@ -10,7 +10,7 @@ from typing import Literal
 from language.expressions.parser import parse_expression
 from language.expressions.syntax_tree import Negation, NumberLiteral, SyntaxTree
 from language.expressions.units import Dimension, are_compatible
-from language.text.diagnostic import Problems, SpecError
+from language.text.diagnostic import Problem, Problems, SpecError
 from language.text.document import Document, Entry, MappingNode, ScalarNode, SequenceNode, YamlNode
 from language.text.overlay import apply_overlay, without_keys
 from modewright.editing.spec_diff.subject import (
@@ -143,10 +143,8 @@ def diff_documents(before: Document, after: Document) -> tuple[SpecChange, ...]:
     the spelling of expressions do not count. Raises SpecError if the kinds differ.
     """
     if before.kind != after.kind:
-        problems = Problems()
         label = f"`{after.name}` is of kind {after.kind}, `{before.name}` of kind {before.kind}"
-        problems.error("form", after.name_span, label, "specs of one kind are compared")
-        problems.raise_if_errors()
+        raise SpecError([Problem("form", after.name_span, label, "specs of one kind are compared")])
     pair = _DocumentPair(expand_templates(before.root), expand_templates(after.root))
     heads = ("language", before.kind)
     found = [

@@ -15,7 +15,7 @@ from pathlib import Path
 from codegen.toolchain.external_tools import require_tool
 from language.overlays.expand_document import expand_document
 from language.readers.base_reader import NO_SPAN
-from language.text.diagnostic import Problems, Source, Span, SpecError
+from language.text.diagnostic import Problem, Problems, Source, Span, SpecError
 from language.text.document import Document, Entry, MappingNode, ScalarNode, SequenceNode, YamlNode
 from language.text.node_edit import put_node
 from language.text.overlay import apply_overlay
@@ -109,10 +109,10 @@ def _extract_revision(reference: str, revision: str, folder: Path) -> None:
     except (OSError, subprocess.CalledProcessError) as error:
         output = getattr(error, "stderr", b"") or str(error).encode()
         first = (output.decode("utf-8", errors="replace").splitlines() or ["no answer"])[0]
-        problems = Problems()
         place = Span(Source("command line", (reference,)), 1, 1, len(revision))
-        problems.error("name", place, f"Git has no `{revision}` here: {first}")
-        raise SpecError(problems.reported) from None
+        raise SpecError(
+            [Problem("name", place, f"Git has no `{revision}` here: {first}")]
+        ) from None
     with tarfile.open(fileobj=io.BytesIO(data)) as archive:
         for member in archive:
             content = archive.extractfile(member) if member.isfile() else None

@@ -55,7 +55,7 @@ MISTAKES = {
         "        if (work->request_chart == 0U) {\n"
         "            choose_operation(self, work);\n        }",
     ),
-    "of two wishes both are taken": (
+    "of two requests both are taken": (
         "resolve_request_operation_drive_torque",
         "            work->selected_chart = 0U;\n        }\n"
         "        work->selected_operation_drive_torque",

@@ -24,6 +24,8 @@ from tests.diagnosis.conftest import SOON
 from tests.diagnosis.estimation.test_levenberg_marquardt import OUTPUTS, PERIOD
 from tests.language.spec_builders import ROOT
 
+pytestmark = pytest.mark.long
+
 Reals = NDArray[np.float64]
 COUNTS = (150, 90, 211, 40, 171)
 """Samples of recordings: one vector and one that is left over."""

@@ -8,7 +8,7 @@ import pytest
 
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.localisation.cause import attribute_causes, is_inactive
-from diagnosis.localisation.free_disturbance import free_disturbance
+from diagnosis.localisation.disturbance_state_fit import free_disturbance
 from diagnosis.localisation.location import Location, location_of, with_smoothed_disturbances
 from diagnosis.localisation.ranking import rank_causes_first
 from diagnosis.model.placed_effect import shipped_effects

@@ -13,7 +13,7 @@ from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.estimation.noise_level import disturbance_units, fit_base, recalibrate
 from diagnosis.localisation.cause import balance_of
-from diagnosis.localisation.free_disturbance import free_disturbance
+from diagnosis.localisation.disturbance_state_fit import free_disturbance
 from diagnosis.localisation.location import Location, location_of
 from diagnosis.localisation.location_text import NO_LOCATION, format_location
 from diagnosis.localisation.ranking import (
@@ -67,11 +67,11 @@ def test_a_sensor_is_not_taken_for_a_torque(bench: ModelSet) -> None:
 def test_what_small_drifts_of_the_base_take_up_is_hardly_unknown(bench: ModelSet) -> None:
     hidden = with_effect(bench, "coulomb_friction@w_em", FRICTION)
     base = fit_first_base(hidden)
-    loci, quiet = localise(hidden, base), free_disturbance(hidden, base).cost
+    loci, without_drifts = localise(hidden, base), free_disturbance(hidden, base).cost
     gain = loci[0].gain / integrated_autocorrelation(base, hidden.series)
-    without = dataclasses.replace(base, cost=quiet)
+    without = dataclasses.replace(base, cost=without_drifts)
     assert unexplained_gain(hidden, without, loci) == pytest.approx(gain)
-    as_good = dataclasses.replace(base, cost=quiet - loci[0].gain)
+    as_good = dataclasses.replace(base, cost=without_drifts - loci[0].gain)
     assert unexplained_gain(hidden, as_good, loci) == pytest.approx(ABSORBED_FRACTION * gain)
 
 

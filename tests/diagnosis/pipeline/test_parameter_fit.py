@@ -64,8 +64,9 @@ def test_only_those_named_move_and_the_calibration_is_a_spec(
         (["--parameters", "J,,b"], "`J,,b` has an empty name"),
         (["--parameters", "J,b,J"], "`J` is named twice"),
         (["--out", "rig.txt"], "rig.txt: a calibration ends with .yaml"),
-        (["--name", "rig 7"], "`rig 7` is not a name"),
-        (["--date", "21.11.2026"], "a date is written as"),
+        (["--out", "rig.yaml", "--name", "rig 7"], "`rig 7` is not a name"),
+        (["--out", "rig.yaml", "--date", "21.11.2026"], "a date is written as"),
+        (["--name", "rig_7"], "goes with --out"),
     ],
 )
 def test_what_cannot_be_fitted_is_told(

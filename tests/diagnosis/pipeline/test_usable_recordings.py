@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import modewright as mw
+from diagnosis.data_quality.channel import MIN_SAMPLES
 from diagnosis.pipeline.usable_recordings import (
     MAX_SAMPLES,
     MAX_VALUE,
-    MIN_SAMPLES,
     LazyRecordings,
     unusable_reason,
 )

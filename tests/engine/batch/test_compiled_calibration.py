@@ -13,7 +13,7 @@ from codegen.simulator.compiled_stepper import CompiledStepper
 from codegen.simulator.simulator_library import load_library
 from codegen.toolchain.compiler import flags_at_level
 from engine.batch.batch import Batch, SignalStatistic
-from engine.batch.compiled_batch import run_compiled_batch
+from engine.batch.compiled_batch import CompiledBatch
 from engine.batch.compiled_run import CompiledRun
 from engine.batch.interpreted_batch import run_interpreted_batch
 from engine.interpreter.interpreter import Interpreter
@@ -115,7 +115,7 @@ def test_a_batch_reads_the_page_beside_what_it_varies(tmp_path: Path) -> None:
         statistics=tuple(SignalStatistic(signal, signal, "final") for signal in signals),
     )
     mine, theirs = (
-        run_compiled_batch(batch, partial(load_library, flags=QUICK)),
+        CompiledBatch(batch, partial(load_library, flags=QUICK)).run(),
         run_interpreted_batch(batch),
     )
     assert mine.note == "compiled"

@@ -16,7 +16,7 @@ import modewright as mw
 from codegen.simulator.simulator_library import SimulatorLibrary, load_library
 from codegen.toolchain.compiler import flags_at_level
 from engine.batch.batch import Batch, BatchResult, InputTable, SignalStatistic
-from engine.batch.compiled_batch import CompiledBatchCache, run_compiled_batch
+from engine.batch.compiled_batch import CompiledBatch, CompiledBatchCache
 from engine.batch.compiled_run import CompiledRun
 from engine.batch.interpreted_batch import run_interpreted_batch
 from engine.batch.run_plan import planning_obstacle
@@ -27,6 +27,8 @@ from language.programs.system_program import SimulationAssembly
 from modewright.api.simulation import load
 from modewright.runtime.back_end_choice import run_batch, run_simulation
 from tests.language.spec_builders import ROOT
+
+pytestmark = pytest.mark.long
 
 DRIVELINES = ROOT / "tests/data/specs/drivelines"
 compile_unoptimised = partial(load_library, flags=flags_at_level("O0"))
@@ -180,7 +182,7 @@ def test_variants_of_a_batch_have_the_bits_of_the_interpreter_on_any_number_of_t
     theirs = run_interpreted_batch(batch)
     assert theirs.event_counts.max() > batch.max_events
     for threads in (1, 2):
-        mine = run_compiled_batch(batch, compile_unoptimised, threads)
+        mine = CompiledBatch(batch, compile_unoptimised).run(threads)
         assert mine.note == "compiled"
         assert_same_batch(mine, theirs)
 
@@ -257,7 +259,7 @@ def test_a_variant_that_leaves_a_range_or_stops_is_told_by_the_interpreter() -> 
         initial={"plant.w_em": np.array([310.0, 2500.0])},
         inputs={"T_req": InputTable((Fraction(0),), np.array([[30.0], [30.0]]))},
     )
-    mine = run_compiled_batch(batch, compile_unoptimised)
+    mine = CompiledBatch(batch, compile_unoptimised).run()
     assert list(mine.faults) == [1]
     assert_same_batch(mine, run_interpreted_batch(batch))
 

@@ -13,7 +13,7 @@ import pytest
 from codegen.simulator.simd_batch import LANES
 from codegen.simulator.simulator_source import emit_simulator_files
 from engine.batch.batch import Batch, InputTable, SignalStatistic
-from engine.batch.compiled_batch import CompiledBatch, run_compiled_batch
+from engine.batch.compiled_batch import CompiledBatch
 from engine.batch.interpreted_batch import run_interpreted_batch
 from language.model.system import Scenario, System
 from modewright.api.simulation import load
@@ -90,7 +90,7 @@ def test_a_plant_with_its_estimator_has_the_bits_of_single_runs() -> None:
     assert side_by_side(batch)
     theirs = run_interpreted_batch(batch)
     assert theirs.event_counts.max() > 1
-    assert_same_batch(run_compiled_batch(batch, compile_unoptimised, 1), theirs)
+    assert_same_batch(CompiledBatch(batch, compile_unoptimised).run(1), theirs)
 
 
 def test_a_lane_that_leaves_its_range_or_ends_does_not_disturb_the_others() -> None:
@@ -99,7 +99,7 @@ def test_a_lane_that_leaves_its_range_or_ends_does_not_disturb_the_others() -> N
     )
     start = np.array([310.0, 2500.0, 311.0, 312.0, 2395.0])
     batch = batch_of(system, scenario, initial={"plant.w_em": start})
-    mine = run_compiled_batch(batch, compile_unoptimised, 1)
+    mine = CompiledBatch(batch, compile_unoptimised).run(1)
     assert 1 in mine.faults and not {0, 2, 3} & set(mine.faults)
     assert_same_batch(mine, run_interpreted_batch(batch))
 
@@ -125,7 +125,7 @@ def test_effects_on_a_plant_have_the_same_bits(effect: str, project: Path) -> No
     assert side_by_side(batch) == LAID[effect]
     theirs = run_interpreted_batch(batch)
     assert theirs.event_counts.max() > 1
-    assert_same_batch(run_compiled_batch(batch, compile_unoptimised, 1), theirs)
+    assert_same_batch(CompiledBatch(batch, compile_unoptimised).run(1), theirs)
 
 
 @pytest.mark.parametrize(
@@ -137,7 +137,7 @@ def test_other_drivelines_have_the_same_bits(name: str, scenario: str) -> None:
     (plant,) = system.instances
     batch = batch_of(system, short, plant)
     assert_same_batch(
-        run_compiled_batch(batch, compile_unoptimised, 1), run_interpreted_batch(batch)
+        CompiledBatch(batch, compile_unoptimised).run(1), run_interpreted_batch(batch)
     )
 
 

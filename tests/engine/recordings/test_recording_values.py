@@ -89,13 +89,27 @@ class TestATimeStamp:
             "drive.csv:3:1: error: no time stamp\n  ,1,1\n  ^"
         )
 
-    @pytest.mark.parametrize("cell", ["NaN", "inf", "12:30:01", "x", "1_0", "0x1F", "1e15"])
-    def test_that_is_not_a_number(self, told: RenderProblems, cell: str) -> None:
+    @pytest.mark.parametrize(
+        ("cell", "reason"),
+        [
+            *((cell, "is not a number") for cell in ("NaN", "12:30:01", "x", "1_0", "0x1F")),
+            *((cell, "is not finite") for cell in ("inf", "-Infinity")),
+            *(
+                (cell, "is too large: its magnitude must be below 1e+12")
+                for cell in ("1e15", "-1e12", "1e999", "1000000000000")
+            ),
+        ],
+    )
+    def test_that_is_no_time_says_why(self, told: RenderProblems, cell: str, reason: str) -> None:
         assert told(HEAD + f"0.01,1,1\n{cell},1,1\n") == (
-            f"drive.csv:3:1: error: the time stamp `{cell}` is not a number\n"
+            f"drive.csv:3:1: error: the time stamp `{cell}` {reason}\n"
             f"  {cell},1,1\n"
             f"  {'^' * len(cell)}"
         )
+
+    def test_that_is_long_is_shortened(self, told: RenderProblems) -> None:
+        text = told(HEAD + f"0.01,1,1\n0.{'1' * 60},1,1\n").splitlines()[0]
+        assert text.endswith(f"the time stamp `0.{'1' * 38}...` has more than 40 characters")
 
     def test_of_a_channel_of_its_own_is_checked_too(self, told: RenderProblems) -> None:
         columns = "  w: {to: w, unit: rad/s, time: t_w, blank: skip}\n"

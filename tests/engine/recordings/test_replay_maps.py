@@ -126,8 +126,21 @@ class TestAMap:
 
     def test_that_leaves_no_tick_is_told(self, echoed: Callable[..., LoadedReplay]) -> None:
         ready = echoed("  a: {to: a, unit: A, delay: 1 s}\n", "t,a\n0,1\n0.5,2\n")
-        with pytest.raises(SpecError, match="ticks"):
+        with pytest.raises(SpecError, match="ticks") as caught:
             ready.replay()
+        (problem,) = caught.value.problems
+        assert str(problem.span).endswith("x.csv:1:1")
+        assert problem.help == "`a` (time `t`) begins at 1 s, the recording ends at 0.5 s"
+
+    def test_whose_time_leaps_is_told_at_the_recording(
+        self, echoed: Callable[..., LoadedReplay]
+    ) -> None:
+        ready = echoed("  a: {to: a, unit: A}\n", "t,a\n0,1\n0.5,2\n1e9,3\n")
+        with pytest.raises(SpecError, match="ticks") as caught:
+            ready.replay()
+        (problem,) = caught.value.problems
+        assert str(problem.span).endswith("x.csv:1:1")
+        assert problem.help.endswith("of its time stamps is from 0.5 s to 1e+09 s")
 
     def test_that_compares_another_dimension_is_told(
         self, echoed: Callable[..., LoadedReplay]

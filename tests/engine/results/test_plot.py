@@ -84,6 +84,12 @@ def test_an_unknown_signal_names_the_nearest() -> None:
         draw_overview([run()], ["p.T_bg"])
 
 
+@pytest.mark.parametrize("span", [(1.5, np.inf), (-np.inf, -0.5), (0.51, 0.59)])
+def test_a_window_without_samples_is_refused(span: tuple[float, float]) -> None:
+    with pytest.raises(ValueError, match=r"no sample lies in .*: they cover 0 s to 1 s"):
+        draw_overview([run()], span=span)
+
+
 def test_the_same_run_gives_the_same_svg_and_it_is_xml() -> None:
     first, second = draw_overview([run()]).data("svg"), draw_overview([run()]).data("svg")
     assert first == second

@@ -131,6 +131,13 @@ def test_a_tolerance_for_no_signal_is_refused() -> None:
         compare_runs(run([0.0]), run([0.0]), tolerances={"q": 1.0})
 
 
+@pytest.mark.parametrize("value", [-1.0, np.nan, np.inf])
+def test_a_tolerance_that_is_negative_or_not_finite_is_refused(value: float) -> None:
+    for given in ({"tolerances": {"p.T": value}}, {"relative": value}, {"slack": value}):
+        with pytest.raises(ValueError, match="it is finite and at least 0"):
+            compare_runs(run([0.0]), run([0.0]), **given)
+
+
 def test_the_picture_shades_where_modes_disagree_and_draws_the_difference() -> None:
     a, b = run([0.0] * 5, [0, 1, 1, 1, 0]), run([1.0] * 5, [0, 0, 0, 1, 0])
     figure = draw_difference(a, b, compare_runs(a, b), ("one", "two")).figure

@@ -94,6 +94,8 @@ def refusal(path: Path) -> str:
         ("t [s],a [1]\n0.0,x\n", "run.csv:2:1: `x` in column `a [1]` is not a number"),
         ("t [s],a [1],a [1]\n", "is there twice"),
         ("t [s],a\n", "`a` is not `name [unit]`"),
+        ("t [s],a [1]\n0.1,1\n0.0,1\n", "run.csv:3:1: the time 0.0 s is before that of the row"),
+        ("t [s],a [1]\n0.0,1\nnan,1\n", "run.csv:3:1: the time `nan` is not finite"),
     ],
 )
 def test_a_damaged_csv_is_refused_with_its_line(text: str, told: str, tmp_path: Path) -> None:
@@ -113,6 +115,42 @@ def test_a_damaged_side_file_is_refused(text: str, tmp_path: Path) -> None:
     path = save(run(), tmp_path / "run.csv")
     side_path(path).write_text(text)
     assert "side file" in refusal(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('"time": 0.30000000000000004', '"time": "a"', "`events[0]` has a `time` that is not a"),
+        ('"time": 0.30000000000000004', '"time": NaN', "`NaN` is not a finite number"),
+        ('"time": 0.30000000000000004', '"time": 1e999', "`1e999` is not a finite number"),
+        ('"micro_step": 1', '"micro_step": 1.5', "`events[0]` has a `micro_step`"),
+        ('"source": "gap"', '"source": 3', "`events[0]` has a `source` that is not a text"),
+        ('"source": "gap"', '"sauce": "gap"', "`events[0]` has an unknown key `sauce`"),
+        ('"source": "gap",', "", "`events[0]` has no `source`"),
+        ('"0": "gap"', '"x": "gap"', "`modes.plant.mode` is not a mapping"),
+        ('"0": "gap"', '"0": 7', "`modes.plant.mode` is not a mapping"),
+        ('"whole": [', '"whole": [1, ', "`whole` is not a list of texts"),
+        ('"whole": [', '"whole": ["plant.T_hs", ', "`plant.T_hs` has samples that are not whole"),
+        ('"name": "sweep, 1"', '"name": [1]', "`name` is not a text"),
+        ('"stopped": "', '"stopped": false, "x": "', "`stopped` is neither a text nor null"),
+        ('"faults": [', '"faults": [null, ', "`faults` is not a list of texts"),
+    ],
+)
+def test_a_wrong_value_in_a_side_file_is_refused_with_its_key(
+    old: str, new: str, told: str, tmp_path: Path
+) -> None:
+    path = save(run(), tmp_path / "run.csv")
+    text = side_path(path).read_text()
+    assert old in text
+    side_path(path).write_text(text.replace(old, new, 1))
+    message = refusal(path)
+    assert told in message and message.startswith(str(side_path(path)))
+
+
+def test_a_side_file_that_is_nested_too_deeply_is_refused(tmp_path: Path) -> None:
+    path = save(run(), tmp_path / "run.csv")
+    side_path(path).write_text("[" * 100_000)
+    assert "nested too deeply" in refusal(path)
 
 
 def test_what_is_no_parquet_is_refused(tmp_path: Path) -> None:

@@ -8,7 +8,14 @@ import pytest
 from hypothesis import given, strategies as st
 
 from language.text.diagnostic import Source
-from language.text.document import MAX_BYTES, MappingNode, ScalarNode, SequenceNode, read_text
+from language.text.document import (
+    MAX_BYTES,
+    MappingNode,
+    ScalarNode,
+    SequenceNode,
+    lines_of,
+    read_text,
+)
 from language.text.yaml_parser import MAX_DEPTH, parse_yaml
 from tests.language.spec_builders import automaton, problem_lines, raised_problems
 
@@ -270,3 +277,12 @@ def test_a_comma_in_braces_is_explained() -> None:
     text = f"language: 1\nautomaton: a\n{states}\nmodes: {{o: {{}}}}\n"
     problems = raised_problems(lambda: automaton(text))
     assert [problem.help for problem in problems] == ['quote it: `initial: "max(1 m, 2 m)"`']
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r", "\x85", "\u2028", "\u2029"])
+def test_a_line_end_at_the_end_starts_no_further_line(end: str) -> None:
+    assert lines_of(f"a{end}") == ("a",)
+    assert lines_of(f"a{end}b") == lines_of(f"a{end}b{end}") == ("a", "b")
+    assert lines_of(f"a{end}{end}") == ("a", "")
+    assert lines_of(end) == ("",)
+    assert lines_of("") == ()

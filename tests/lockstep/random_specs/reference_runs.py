@@ -70,7 +70,7 @@ def _differs(mutant: Mutant, one: ReferenceRun, ticks: int, patch: pytest.Monkey
         mutant.patch(patched)
         patched.setattr(
             "engine.interpreter.interpreter._compile_program",
-            lambda same: BlockCompiler(same.program),
+            BlockCompiler,
         )
         tape = record_ticks(one.spec, one.program, ticks, mutant.rewrite(one.program))
     # A run that is stopped earlier differs as well.

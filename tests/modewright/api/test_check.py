@@ -10,6 +10,9 @@ from pathlib import Path
 import pytest
 
 from language.text.diagnostic import Problem, Source, Span
+from modewright.api.spec_check import check
+from modewright.cli.app import app
+from modewright.cli.common.exit_codes import run_with_exit_code
 from modewright.render.github_annotations import annotation_lines
 from modewright.render.sarif import to_sarif
 
@@ -100,3 +103,53 @@ def test_an_annotation_has_no_sign_that_would_end_it() -> None:
 
 def test_sarif_of_a_fine_spec_has_no_results() -> None:
     assert to_sarif([])["runs"][0]["results"] == []
+
+
+HEADS = {
+    "system": "inputs: {}",
+    "scenario": "of: estimator",
+    "map": "time: t",
+    "variant": "extends: tip_out",
+    "calibration": "of: estimator",
+    "study": "about: sweep",
+    "test": "of: estimator",
+}
+
+
+@pytest.mark.parametrize("kind", HEADS)
+@pytest.mark.parametrize("name", ["../../evil", "''", "/tmp/evil", "a b", "1st", "a" * 64, "off"])
+def test_the_name_of_a_document_is_checked(kind: str, name: str, tmp_path: Path) -> None:
+    path = tmp_path / "document.yaml"
+    path.write_text(f"language: 1\n{kind}: {name}\n{HEADS[kind]}\n")
+    found = [p for p in check(str(path)) if p.kind == "name" and p.code == "MW115"]
+    assert [p.span.line for p in found] == [2]
+
+
+@pytest.mark.parametrize("name", ["class", "a" * 63])
+def test_a_name_that_is_in_no_c_may_be_a_word_of_c(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "document.yaml"
+    path.write_text(f"language: 1\ncalibration: {name}\nof: estimator\nparameters: {{}}\n")
+    assert check(str(path)) == []
+
+
+@pytest.mark.parametrize("target", ["secret.yaml", "secrets"])
+def test_a_link_to_a_file_outside_of_the_project_is_not_read(
+    target: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "secrets").mkdir()
+    for secret in (tmp_path / "secret.yaml", tmp_path / "secrets" / "secret.yaml"):
+        secret.write_text("root:x:0:0: {password\n")
+    spec = tmp_path / "project" / "spec"
+    spec.mkdir(parents=True)
+    (spec / target).symlink_to(tmp_path / target)
+    (spec / "own.yaml").write_text("language: 1\ncalibration: own\nof: estimator\nparameters: {}\n")
+    (spec / "link.yaml").symlink_to(spec / "own.yaml")
+    monkeypatch.chdir(tmp_path / "project")
+    path = "spec/secret.yaml" if target == "secret.yaml" else "spec/secrets/secret.yaml"
+    assert [(p.code, str(p.span)) for p in check(path)] == [("MW116", f"{path}:1:1")]
+    assert check("spec/link.yaml") == []
+    for command in (["check", path], ["format", "--check", path]):
+        assert run_with_exit_code(lambda: app(command, standalone_mode=False)) == 1  # noqa: B023
+        assert "password" not in capsys.readouterr().err
+    monkeypatch.setenv("MODEWRIGHT_ALLOW_OUTSIDE", "1")
+    assert [p.code for p in check(path)] == ["MW106"]

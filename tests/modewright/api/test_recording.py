@@ -97,6 +97,92 @@ def test_without_a_map_columns_are_guessed_by_their_names(
     assert [one["name"] for one in found["inputs"]] == ["torque_Nm"]
 
 
+def test_without_a_map_the_columns_of_all_files_are_guessed(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    times, values = tip_in()
+    both = {"t_ms": 1e3 * times, "torque_Nm": values["torque"]}
+    table(project / "first.csv", both)
+    table(project / "second.csv", {**both, "motor_rpm": values["motor"]})
+    assert run("first.csv", "second.csv", "--json") == 1
+    found = json.loads(capsys.readouterr().out)
+    assert [(c["recording"], c["name"]) for c in found["channels"]] == [
+        ("first.csv", "torque_Nm"),
+        ("second.csv", "torque_Nm"),
+        ("second.csv", "motor_rpm"),
+    ]
+    assert [(f["recording"], f["channel"], f["kind"]) for f in found["findings"]] == [
+        ("first.csv", "motor_rpm", "no_signal")
+    ]
+
+
+def drive_with(project: Path, columns: dict[str, str]) -> str:
+    """Write a recording without map, with columns of one text each; return its name."""
+    times, values = tip_in()
+    table(project / "plain.csv", {"t_s": times, "torque_Nm": values["torque"]})
+    head, *rows = (project / "plain.csv").read_text("utf-8").splitlines()
+    lines = [",".join([head, *columns]), *(",".join([row, *columns.values()]) for row in rows)]
+    (project / "plain.csv").write_text("\n".join(lines) + "\n", "utf-8")
+    return "plain.csv"
+
+
+@pytest.mark.parametrize(
+    ("cell", "severity", "reason"),
+    [
+        ("nan", "error", "has no number: it is all nan"),
+        ("", "error", "has no number: it is blank"),
+        ("fast", "warning", "has text, such as 'fast'"),
+    ],
+)
+def test_a_column_that_is_left_out_without_a_map_is_named_with_the_reason(
+    project: Path, capsys: pytest.CaptureFixture[str], cell: str, severity: str, reason: str
+) -> None:
+    assert run(drive_with(project, {"speed_rpm": cell})) == (severity == "error")
+    text = " ".join(capsys.readouterr().out.split())
+    assert f"{severity}: `speed_rpm` (plain.csv): {reason}: left out" in text
+
+
+def test_a_column_that_is_there_twice_is_named_without_a_map(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = drive_with(project, {})
+    rows = [line.split(",") for line in (project / file).read_text("utf-8").splitlines()]
+    lines = [",".join([*row, "a_V" if k == 0 else f"{k}", row[1]]) for k, row in enumerate(rows)]
+    (project / file).write_text("\n".join(lines) + "\n", "utf-8")
+    assert run(file, "--json") == 1
+    found = json.loads(capsys.readouterr().out)
+    assert [(f["kind"], f["channel"]) for f in found["findings"] if f["kind"] == "left_out"] == [
+        ("left_out", "torque_Nm")
+    ]
+    assert "is in the file twice" in str(found["findings"])
+
+
+def test_columns_beyond_the_first_twelve_are_named(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    times, values = tip_in()
+    many = {f"c{k}": values["motor"] for k in range(14)}
+    table(project / "wide.csv", {"t_s": times, **many})
+    assert run("wide.csv") in (0, 1)
+    text = " ".join(capsys.readouterr().out.split())
+    assert "note: `c12`, `c13` (wide.csv): is not among the first 12 columns: left out" in text
+
+
+def test_a_second_clock_that_shares_no_time_is_told_without_a_map(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    times, values = tip_in()
+    wheel = {"t_wheel_s": times, "wheel_rpm": values["wheel"]}
+    rest = {"torque_Nm": values["torque"], **wheel}
+    table(project / "ms.csv", {"t_s": 1000 * times + 1, **rest})
+    assert run("ms.csv") == 1
+    text = " ".join(capsys.readouterr().out.split())
+    assert "error: the times `t_s` (1 s to 8991 s) and `t_wheel_s` (0 s to 8.99 s) have" in text
+    table(project / "unit.csv", {"t_ms": 1000 * times, **rest})
+    run("unit.csv")
+    assert "in common" not in capsys.readouterr().out
+
+
 def test_what_cannot_be_read_is_told_with_its_place(
     project: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -28,12 +28,18 @@ def shell(line: str) -> subprocess.CompletedProcess[str]:
         ("modewright explain driveline >&-", 0),
         ("modewright check tip_out >&-", 0),
         ("modewright check tip_out 2>&-", 0),
-        ("modewright --log-file /dev/full check tip_out", 0),
     ],
 )
 def test_output_that_nobody_reads_is_no_failure(line: str, code: int) -> None:
     done = shell(line)
     assert (done.returncode, done.stderr) == (code, "")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+def test_a_log_that_cannot_be_written_is_one_warning() -> None:
+    done = shell("modewright --log-file /dev/full simulate ev_driveline -s tip_out")
+    warning = "warning: the log /dev/full is incomplete: No space left on device\n"
+    assert (done.returncode, done.stderr) == (0, warning)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")

@@ -87,7 +87,7 @@ def test_samples_and_seed_have_the_limits_of_the_file(
 
 
 def test_blocks_of_no_variants_are_wrong_use_of_the_api() -> None:
-    with pytest.raises(ValueError, match="blocks of -5 variants"):
+    with pytest.raises(ValueError, match="`block` is at least 0, not -5"):
         studies.sweep("alone", "o", block=-5)
     assert not Path("o").exists()
 

@@ -64,7 +64,7 @@ def test_every_valid_spec_is_valid_for_the_schema_too() -> None:
 def test_a_spec_with_a_wrong_key_or_word_is_not() -> None:
     everything = jsonschema.Draft7Validator(json_schema())
     found = 0
-    for told in sorted((ROOT / "tests" / "semantics" / "refused").glob("*.txt")):
+    for told in sorted((ROOT / "tests" / "semantics" / "invalid_specs").glob("*.txt")):
         path = told.with_suffix(".yaml")
         if path.is_file() and WRONG_FORM.search(told.read_text("utf-8")):
             document = _document(path)

@@ -70,8 +70,8 @@ def test_a_repair_that_the_help_gives_is_one(case: Case, tmp_path: Path) -> None
     if case.path.suffix != ".yaml" or not found:
         return
     (tmp_path / "data").symlink_to(ROOT / "tests" / "data")
-    (tmp_path / "semantics" / "refused").mkdir(parents=True)
-    made = tmp_path / "semantics" / "refused" / case.path.name
+    (tmp_path / "semantics" / "invalid_specs").mkdir(parents=True)
+    made = tmp_path / "semantics" / "invalid_specs" / case.path.name
     made.write_text(apply_repairs(case.path.read_text("utf-8"), found), "utf-8")
     others = {(p.kind, p.label) for p in problems} - {(p.kind, p.label) for p, _ in found}
     assert {(p.kind, p.label) for p in problems_of(made)} <= others, error_labels(problems_of(made))

@@ -70,13 +70,13 @@ def _outer_first(patch: pytest.MonkeyPatch) -> None:
     patch.setattr("language.charts.micro_step.selection_blocks", blocks)
 
 
-def _all_wishes(patch: pytest.MonkeyPatch) -> None:
-    """Regions that leave each other all get what they wish."""
+def _all_requests(patch: pytest.MonkeyPatch) -> None:
+    """The requests of regions that leave each other are all taken."""
     patch.setattr(selecting, "_conflicting_regions", lambda charting, region: [])
 
 
 def _first_stays(patch: pytest.MonkeyPatch) -> None:
-    """A wish from further inside does not drive out one from outside."""
+    """A request from further inside does not drive out one from outside."""
     patch.setattr(Chart, "is_region_inside", lambda self, region, other: False)
 
 
@@ -113,7 +113,7 @@ MUTANTS: Mapping[str, Patch] = {
         _no_history,
         _shallow_is_deep,
         _outer_first,
-        _all_wishes,
+        _all_requests,
         _first_stays,
         _regions_at_initial,
         _still_active,

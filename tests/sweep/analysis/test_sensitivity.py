@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from SALib.analyze import morris as salib_morris, sobol as salib_sobol
 
+from engine.results.array_types import Reals
 from language.text.diagnostic import SpecError
 from sweep.analysis.sensitivity import (
     Index,
@@ -23,7 +24,6 @@ from sweep.design.sensitivity_design import STRIDE, morris_points
 from sweep.evaluation.exact_moments import scale_to_squarable
 from sweep.execution.study_run import run_study
 from sweep.store.store import read_store
-from sweep.store.table import Reals
 from tests.sweep.example_studies import QUICK_EXECUTOR, ReversedExecutor, make_study, store_rows
 
 A, B = 7.0, 0.1

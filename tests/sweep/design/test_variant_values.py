@@ -67,7 +67,7 @@ def sensor_values(project: Project, *structural: VariantValues) -> list[float]:
     scenario = read_scenario(read_document(project.path_of("run")), project, system)
     for values in structural:
         system = apply_to_system(system, values.structural_values)
-    return simulate(system, scenario).signals["s"].tolist()
+    return [float(value) for value in simulate(system, scenario).signals["s"]]
 
 
 @pytest.mark.parametrize("stage", ["filter.lag", "delay", "noise.sd", "quantise"])

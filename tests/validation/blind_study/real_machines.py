@@ -21,7 +21,7 @@ import modewright as mw
 from diagnosis.data.sampled_recording import SampledRecording, decimate
 from diagnosis.estimation.estimate import evaluate
 from diagnosis.estimation.noise_level import disturbance_units
-from diagnosis.localisation.free_disturbance import ALL_LEVELS, scan_level
+from diagnosis.localisation.disturbance_state_fit import ALL_LEVELS, scan_level
 from diagnosis.localisation.smoother import smooth_states
 from diagnosis.model.parameter_vector import vector_of
 from diagnosis.model.placed_effect import DISTURBANCE_STATE

@@ -19,8 +19,8 @@ from tests.validation.evidence.evidence_store import ROOT
         "/data/cases_labels.json",
         "/data/LABELS/a.json",
         "/data/labels.pyc.json",
-        ROOT / "tests" / "generators" / "concealed" / "library.py",
-        ROOT / "tests" / "generators" / "open" / "__pycache__" / "label.pyc",
+        ROOT / "tests" / "generators" / "blind_cases" / "physical_parameters.py",
+        ROOT / "tests" / "generators" / "open_cases" / "__pycache__" / "label.pyc",
     ],
 )
 def test_what_is_concealed_is_seen(path: Path | str) -> None:
@@ -63,7 +63,7 @@ def test_a_look_ends_the_process(tmp_path: Path, look: str) -> None:
     concealed = tmp_path / "truth"
     concealed.mkdir()
     code = (
-        "import sys; from tests.validation.blind_study import sealed;"
+        "import sys; from tests.validation.blind_study import isolated_diagnosis as sealed;"
         "sys.addaudithook(sealed.guard(sealed._end));"
         f"{look.format(str(concealed))}; print('went on')"
     )

@@ -130,7 +130,7 @@ def leaf(estimator: str, path: Path) -> Figure:
 
 def check_refused_specs() -> Figure:
     """Specs that are refused with exactly the text beside them."""
-    book = (ROOT / "tests" / "semantics" / "refused").glob("*.yaml")
+    book = (ROOT / "tests" / "semantics" / "invalid_specs").glob("*.yaml")
     specs = [spec for spec in sorted(book) if not spec.stem.endswith(".repaired")]
     wrong = [
         spec.stem

@@ -14,37 +14,43 @@ from pathlib import Path
 from tests.validation.evidence.evidence_store import ROOT
 
 WHOLE = (
-    *("first_drive", "complete", "lockstep_bits", "random_specs", "random_charts"),
+    *(
+        "reference_traces",
+        "language_and_engine",
+        "lockstep_bit_equality",
+        "random_specs",
+        "random_charts",
+    ),
     *(
         "command_line",
         "editor",
         "static_checks",
-        "charts",
+        "chart_speed",
         "studies",
-        "fast",
-        "diagnosis_figures/open_cases",
+        "performance",
+        "diagnosis_evidence/generated_cases",
     ),
     *(
-        "variants",
+        "diagnosis_variants",
         "tip_out",
-        "diagnosis_figures/resumed_stages",
-        "target_bits",
-        "diagnosis_figures/machines",
+        "diagnosis_evidence/interrupted_diagnosis",
+        "target_bit_equality",
+        "diagnosis_evidence/real_machines",
         "proofs",
         "fuzzing",
     ),
-    *("twins", "mcdc", "paper", "cluster"),
+    *("hand_written_c", "mcdc", "paper", "cluster"),
 )
 PART = (
-    "first_drive",
-    "complete --part",
-    "lockstep_bits --ticks 50000",
+    "reference_traces",
+    "language_and_engine --part",
+    "lockstep_bit_equality --ticks 50000",
     "random_specs --specs 20",
     "random_charts --charts 20",
     *("command_line", "editor", "static_checks"),
 )
 """What CI measures, with words of its own."""
-OF_RECORDINGS = ("first_drive", "diagnosis_figures/machines")
+OF_RECORDINGS = ("reference_traces", "diagnosis_evidence/real_machines")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -69,7 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _path_of(name: str) -> Path:
     """Return the file of a script: one of this folder, or of a folder beside it."""
     folder, _, script = name.rpartition("/")
-    return ROOT / "tests" / "validation" / (folder or "figures") / f"{script}.py"
+    return ROOT / "tests" / "validation" / (folder or "evidence") / f"{script}.py"
 
 
 if __name__ == "__main__":

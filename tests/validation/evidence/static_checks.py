@@ -25,7 +25,7 @@ SECONDS = 3.0
 """For the whole command, 30 modes and 180 transitions."""
 KINDS = 15
 """Least number of kinds of problems of modes and transitions."""
-CASES = ROOT / "tests" / "semantics" / "refused"
+CASES = ROOT / "tests" / "semantics" / "invalid_specs"
 
 
 def main() -> int:

@@ -76,10 +76,11 @@ def _divergence(figure: str, found: Divergence) -> Claim:
         "A model that is tuned right after the event follows the vehicle. About 1 s later the "
         "frequencies differ",
         f"The model is fitted to the first {FITTED} s after the step (k_hs = {k_hs:.0f} N*m/rad, "
-        f"c_hs = {c_hs:.1f} N*m*s/rad). In this time its motor speed has an error of {early:.1%} "
-        f"of the shuffle. Later the error is larger: {middle:.0%} until 0.7 s, and {late:.0%} from "
-        f"0.7 s to 1 s. In the first four cycles after 0.7 s the twist oscillates at {car:.2f} Hz "
-        f"in the vehicle and at {model:.2f} Hz in the model",
+        f"c_hs = {c_hs:.1f} N*m*s/rad). In this time the error of its motor speed is "
+        f"{early:.1%} of the oscillation of that speed. Later the error is larger: "
+        f"{middle:.0%} until 0.7 s, and {late:.0%} from 0.7 s to 1 s. In the first four cycles "
+        f"after 0.7 s the twist oscillates at {car:.2f} Hz in the vehicle and at "
+        f"{model:.2f} Hz in the model",
         early < 0.03 and late > 0.3,
         "The recordings of the paper are not published, so the vehicle here is a simulation. "
         "Beside its half-shaft acts a rubber element with a fifth of the shaft's stiffness, which "

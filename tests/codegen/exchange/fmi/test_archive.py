@@ -20,6 +20,8 @@ from codegen.toolchain.compiler import FLAGS, WARNINGS, BuildError
 from modewright.api.simulation import program
 from tests.codegen.exchange.fmi.conftest import Ready
 
+pytestmark = pytest.mark.long
+
 MAIN = """
 #include <stdio.h>
 #include "fmi3Functions.h"

@@ -1,6 +1,6 @@
-"""Leaf twin: writes a synthetic drive that looks like a CAN recording of a Nissan LEAF.
+"""Synthetic recording: writes a synthetic drive that looks like a CAN recording of a Nissan LEAF.
 
-    python tests/data/synthetic_leaf/make_synthetic_recording.py [FILE]  (default: drive_twin.csv)
+    python tests/data/synthetic_nissan_leaf/make_synthetic_recording.py [FILE]
 
 Two inertias and one backlash (Guercioni et al. 2018, eqs 1-9; Nordin's form of the gap) with the
 values of spec/nissan_leaf/leaf.yaml, over those of spec/ev_driveline/plant.yaml. It imports

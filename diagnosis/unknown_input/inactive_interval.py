@@ -1,7 +1,7 @@
-"""Quiet intervals: parameters estimated where an unknown input does not act.
+"""Inactive intervals: parameters estimated where an unknown input does not act.
 
-An input that is free everywhere also absorbs the error of a wrong mass or drag. In its quiet
-intervals the model must follow without it.
+An input that is free everywhere also absorbs the error of a wrong mass or drag. In the
+intervals in which the input is inactive, the model must follow without it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.data.stacked_recordings import burn_in_samples
 from diagnosis.estimation.estimate import Estimate, evaluate
 from diagnosis.estimation.noise_level import INITIAL_LEVELS, disturbance_units, fit_with_noise
-from diagnosis.localisation.free_disturbance import (
+from diagnosis.localisation.disturbance_state_fit import (
     ALL_LEVELS,
     SMALL_LEVEL,
     scan_level,
@@ -27,25 +27,25 @@ from diagnosis.model.parameter_vector import ParameterVector
 
 Booleans = NDArray[np.bool_]
 MARGIN = 0.5
-"""Seconds before and behind it in which an input is not yet silent."""
+"""Time [s] before and after an active interval that does not count as inactive."""
 MIN_DURATION = 2.0
-"""Seconds that a silence lasts at least: the states have to be found in it."""
+"""Shortest inactive interval [s]; the observer must find the states in it."""
 START_LEVELS = (INITIAL_LEVELS[0], INITIAL_LEVELS[-1])
-"""Levels of all drifts from which the silences are fitted."""
-MIN_QUIET_FRACTION = 1.0 / 3.0
-"""Part of the recordings that silences have at least, if parameters are to follow from them."""
+"""Levels of all disturbances from which the fits start."""
+MIN_INACTIVE_FRACTION = 1.0 / 3.0
+"""Smallest fraction of the samples that is inactive, for parameters to follow from it."""
 
 
-def refit_on_quiet_intervals(
+def refit_on_inactive_intervals(
     model: Estimate, series: Sequence[SampledRecording], active: Sequence[Booleans], name: str
 ) -> Estimate:
-    """Return a model with the disturbance `name` free and parameters from its quiet intervals.
+    """Return a model with the disturbance `name` free and parameters from its inactive intervals.
 
     `active` (samples,) of each recording after its burn-in marks where the input acts. The model is
-    returned unchanged if the quiet intervals are too short.
+    returned unchanged if the inactive intervals are too short.
     """
-    pieces, places = _quiet_recordings(series, active)
-    if sum(one.count for one in pieces) < MIN_QUIET_FRACTION * sum(one.count for one in series):
+    pieces, places = _inactive_recordings(series, active)
+    if sum(one.count for one in pieces) < MIN_INACTIVE_FRACTION * sum(one.count for one in series):
         return model
     units = disturbance_units(model.candidate, series, model.values(0))
     recording_indices = [places.index(r) if r in places else 0 for r in range(len(series))]
@@ -65,10 +65,13 @@ def refit_on_quiet_intervals(
     return scan_level(free, series, units, name, ALL_LEVELS)
 
 
-def _quiet_recordings(
+def _inactive_recordings(
     series: Sequence[SampledRecording], active: Sequence[Booleans]
 ) -> tuple[list[SampledRecording], list[int]]:
-    """Return the silences, each as a recording, the longest first, and where they are from."""
+    """Return the inactive intervals as recordings, the longest first, and whose part each is.
+
+    The second list contains the index of the recording of each interval.
+    """
     found = []
     for r, (one, there) in enumerate(zip(series, active, strict=True)):
         around = np.ones(2 * round(MARGIN / float(one.period)) + 1)
@@ -76,13 +79,13 @@ def _quiet_recordings(
             np.convolve(np.pad(there, (burn_in_samples(one), 0)).astype(float), around, "same")
             > 0.5
         )
-        found += [(part, r) for part in _quiet_parts(one, near)]
+        found += [(part, r) for part in _inactive_parts(one, near)]
     found.sort(key=lambda pair: -pair[0].count)
     return [part for part, _ in found], [r for _, r in found]
 
 
-def _quiet_parts(series: SampledRecording, active: Booleans) -> list[SampledRecording]:
-    """Return the silent parts of a recording, each from where all signals are known."""
+def _inactive_parts(series: SampledRecording, active: Booleans) -> list[SampledRecording]:
+    """Return the inactive parts of a recording; each begins where all outputs are measured."""
     edges = [0, *(np.flatnonzero(np.diff(active)) + 1).tolist(), series.count]
     known = np.flatnonzero(np.all(np.isfinite(series.measured), axis=1))
     found = []

@@ -1,4 +1,4 @@
-"""Free disturbance: a fit of the base with a large process-noise level at one place.
+"""Disturbance state fit: a fit of the base with a large process-noise level at one place.
 
 The other disturbances stay small.
 """

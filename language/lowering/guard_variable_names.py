@@ -1,4 +1,4 @@
-"""Guard slots: the suffixes of the variables that hold the guards of the active modes."""
+"""Guard variable names: the suffixes of the variables that hold the guards of the active modes."""
 
 from __future__ import annotations
 

@@ -1,0 +1,82 @@
+"""Commands: options and files that are wrong usage."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from modewright.cli.app import app
+from modewright.cli.common.exit_codes import run_with_exit_code
+
+ROWS = "t [s],p.T [N*m]\n0.0,1.0\n0.1,2.0\n"
+
+
+def run(*arguments: str) -> int:
+    return run_with_exit_code(lambda: app(arguments, standalone_mode=False))
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder_with_a_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "run.csv").write_text(ROWS)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("--tolerance", "*.T=-1"),
+        ("--tolerance", "*=nan"),
+        ("--tolerance", "*=inf"),
+        ("--relative", "inf"),
+        ("--relative", "nan"),
+        ("--slack", "nan"),
+    ],
+)
+def test_a_tolerance_that_is_negative_or_not_finite_is_wrong_usage(
+    arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("compare", "run.csv", "run.csv", *arguments) == 2
+    assert "Invalid value" in capsys.readouterr().err
+    assert run("compare", "run.csv", "run.csv", "--tolerance", "*.T=0.5") == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("simulate", "a", "-s", "b", "--reference", "--compiled"), "leave out --compiled"),
+        (("simulate", "a", "-s", "b", "--reference", "--interpreted"), "leave out --interpreted"),
+        (("simulate", "a", "-s", "b", "--method", "DOP853", "--compiled"), "leave out --compiled"),
+        (("simulate", "a", "-s", "b", "--reference", "--method", "RK4"), "leave out --method RK4"),
+        (("-q", "-v", "check", "--all"), "leave out one"),
+        (("check", "--all", "--json", "--github"), "leave out one"),
+        (("trace", "a", "--keys", "--strict"), "leave it out: --keys"),
+        (("trace", "a", "--keys", "--requirements", "needs.csv"), "leave it out: --keys"),
+        (("fit", "a", "--train", "run.csv", "--name", "rig_7"), "goes with --out"),
+        (("fit", "a", "--train", "run.csv", "--date", "2026-11-21"), "goes with --out"),
+    ],
+)
+def test_an_option_that_would_have_no_effect_is_wrong_usage(
+    arguments: tuple[str, ...], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(*arguments) == 2
+    assert told in capsys.readouterr().err.replace("\n", " ")
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "code", "told"),
+    [
+        (ROWS, ("--from", "5"), 2, "no sample lies in 5 s to inf s: they cover 0 s to 0.1 s"),
+        (ROWS[: ROWS.index("\n") + 1], (), 2, "`run.csv` has no samples"),
+        ("t [s]\n0.0\n0.1\n", (), 2, "`run.csv` has no signals"),
+        (f"{ROWS}0.05,1.0\n", (), 1, "run.csv:4:1: "),
+    ],
+)
+def test_a_figure_of_nothing_is_refused(
+    text: str, options: tuple[str, ...], code: int, told: str,
+    tmp_path: Path, capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    (tmp_path / "run.csv").write_text(text)
+    assert run("plot", "run.csv", *options) == code
+    assert told in capsys.readouterr().err.replace("\n", " ")
+    assert not (tmp_path / "plot.png").exists()
