@@ -10,8 +10,8 @@ from pathlib import Path
 
 from diagnosis.model.placed_effect import PlacedEffect
 
-DEFAULT_THRESHOLD = 75.0
-"""Gain [nats] that is needed in training and in cross-validation, without a bootstrap."""
+DEFAULT_THRESHOLD = 20.0
+"""Gain [nats] that an effect needs beyond the price of its parameters."""
 FORMAT = "modewright-thresholds/1"
 
 
@@ -26,7 +26,7 @@ class Thresholds:
     groups: Mapping[str, float] = field(default_factory=dict)
     default: float = DEFAULT_THRESHOLD
     origin: str = "the usual threshold"
-    mode_factor: float = 2.0
+    mode_factor: float = 1.0
 
     def threshold_of(self, placed_effect: PlacedEffect) -> float:
         """Return the threshold [nats] of a placed effect."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from diagnosis.criterion.likelihood_gain import LikelihoodGain, likelihood_gain
+from diagnosis.criterion.explained_share import MIN_SHARE, explained_share, least_variances
 from diagnosis.equation.effect_text import FormulaEffect, build_formula
 from diagnosis.equation.forward_regression import (
     TermColumns,
@@ -22,11 +22,12 @@ from diagnosis.equation.forward_regression import (
 from diagnosis.equation.regression_problem import EquationRegression, regression_at
 from diagnosis.estimation.covariance import quantities_of
 from diagnosis.estimation.estimate import Estimate, evaluate
+from diagnosis.estimation.levenberg_marquardt import estimate_parameters
 from diagnosis.estimation.model_set import ModelSet
-from diagnosis.estimation.noise_level import fit_with_noise
 from diagnosis.localisation.location import Location
 from diagnosis.model.parameter_vector import ParameterVector, vector_of
-from diagnosis.selection.candidate_search import LogCallback
+from diagnosis.selection.comparison import Round, effective_gain
+from diagnosis.selection.intersample import LogCallback
 from language.text.diagnostic import SpecError
 
 MAX_LOCATIONS = 2
@@ -47,60 +48,51 @@ class DiscoveredEquation:
     location: Location
     formula: FormulaEffect
     estimate: Estimate = field(repr=False)
-    likelihood_gain: LikelihoodGain
+    gain: float
+    share: float
     text: str
 
 
 def discover_equation(
     model_set: ModelSet,
-    base: Estimate,
+    compared: Round,
     locations: Sequence[Location],
-    units: Mapping[str, float],
-    threshold: float,
+    min_gain: float,
     log: LogCallback = lambda text: None,
 ) -> DiscoveredEquation | None:
-    """Return the formula with the largest gain over the base; None if none exceeds `threshold`.
+    """Return the formula with the largest gain over the base of a comparison, or None.
 
     At most `MAX_FITS` formulas, at the first `MAX_LOCATIONS` of `locations` (in the order of their
-    ranks) with a gain and no accepted effect, are fitted; the one with the largest total gain is
-    taken. The smaller one of its penalised and its cross-validated gain [nats] must exceed the
-    threshold. A formula at a location of higher rank, fitted again from the parameters of the best
-    one, replaces it if it has more than `LEADING_FRACTION` of its gain. `units` are the disturbance
-    units [SI]; `log` gets a line for each fitted formula.
+    ranks) with a gain and no accepted effect, are fitted. The formula must gain `min_gain` [nats]
+    and explain the same share as an effect (`MIN_SHARE`). A formula at a location of higher rank,
+    fitted again from the parameters of the best one, replaces it if it has more than
+    `LEADING_FRACTION` of its gain. `log` gets a line for each fitted formula.
     """
-    equations: list[DiscoveredEquation] = []
+    base, equations = compared.base, []
     for formula, location in _propose_formulas(model_set, base, locations):
         starts = [base.values(0), _values_beside_disturbance(base, location)]
-        one = _fit_formula(model_set, base, formula, location, starts, units)
+        one = _fit_formula(model_set, compared, formula, location, starts)
         if one is not None:
             log(_format_equation(one))
             equations.append(one)
-    best = max(equations, key=_total_gain, default=None)
-    if best is None or best.likelihood_gain.smaller <= threshold:
+    best = max(equations, key=lambda one: one.gain, default=None)
+    if best is None or best.gain < min_gain or best.share < MIN_SHARE:
         return None
     ranks = [location.path for location in locations]
     for one in equations:
-        is_before = ranks.index(one.location.path) < ranks.index(best.location.path)
-        if is_before:
+        if ranks.index(one.location.path) < ranks.index(best.location.path):
             starts = [best.estimate.values(0)]
-            again = _fit_formula(model_set, base, one.formula, one.location, starts, units)
-            if again is not None and _total_gain(again) > LEADING_FRACTION * _total_gain(best):
+            again = _fit_formula(model_set, compared, one.formula, one.location, starts)
+            if again is not None and again.gain > LEADING_FRACTION * best.gain:
                 log(_format_equation(again))
                 best = again
     return best
 
 
-def _total_gain(equation: DiscoveredEquation) -> float:
-    """Return the total gain [nats] of a formula, -inf if it is not finite."""
-    total = equation.likelihood_gain.total
-    return total if np.isfinite(total) else -np.inf
-
-
 def _format_equation(equation: DiscoveredEquation) -> str:
-    """Return a formula with its location and gains as one line."""
-    known = equation.likelihood_gain
-    gains = f"train {known.penalised:.0f}, left out {known.cross_validated:.0f} nats"
-    return f"{equation.text} at {equation.location.path}: {gains}"
+    """Return a formula with its location, gain and share as one line."""
+    told = f"{equation.gain:.0f} nats, {100.0 * equation.share:.0f} %"
+    return f"{equation.text} at {equation.location.path}: {told}"
 
 
 def _propose_formulas(
@@ -160,11 +152,10 @@ def _choose_base(model_set: ModelSet, base: Estimate, location: Location) -> Est
 
 def _fit_formula(
     model_set: ModelSet,
-    base: Estimate,
+    compared: Round,
     formula: FormulaEffect,
     location: Location,
     starts: Sequence[Mapping[str, float]],
-    units: Mapping[str, float],
 ) -> DiscoveredEquation | None:
     """Return a formula fitted from the best of several `starts` [SI] of the base's parameters.
 
@@ -174,7 +165,7 @@ def _fit_formula(
         candidate = model_set.compile_candidate((formula.placed_effect,))
     except SpecError:
         return None
-    starting_fits = []
+    base, starting_fits = compared.base, []
     for values in starts:
         point = vector_of(candidate, len(model_set.series), {**values, **formula.initial_values})
         own = point.per_recording.copy()
@@ -187,11 +178,12 @@ def _fit_formula(
             )
         )
     start = min(starting_fits, key=lambda one: one.cost).point
-    estimate = fit_with_noise(candidate, model_set.series, base.noise_levels, start, units)
+    estimate = estimate_parameters(candidate, model_set.series, base.noise_levels, start)
     if not np.isfinite(estimate.cost) or estimate.normal_equations is None:
         return None
     each = [estimate.values(k) for k in range(len(model_set.series))]
     text = formula.format_fitted(quantities_of(estimate), each)
-    return DiscoveredEquation(
-        location, formula, estimate, likelihood_gain(estimate, base, model_set.series), text
-    )
+    gain = effective_gain(estimate, base, compared.correlation, len(model_set.series))
+    floor = np.minimum(compared.floor, least_variances([estimate]))
+    share = explained_share(estimate, base, floor)
+    return DiscoveredEquation(location, formula, estimate, gain, share, text)

@@ -30,6 +30,8 @@ INITIAL_LEVELS = (0.1, 0.3, 1.0)
 """Levels from which a base is fitted: a fit with a large level does not find a small one."""
 SMALL_LEVEL = INITIAL_LEVELS[0]
 """The level from which a candidate is fitted first."""
+ORDINARY_LEVEL = 0.1
+"""Level of the ordinary disturbance of each balance, in units, held in every model."""
 HUBER_STDS = 4.0
 """Huber limit of innovations, in their robust standard deviations."""
 NOISE_FACTOR = 1.5

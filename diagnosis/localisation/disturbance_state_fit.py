@@ -14,13 +14,11 @@ from diagnosis.estimation.estimate import Estimate, evaluate, evaluate_near
 from diagnosis.estimation.innovations import NoiseLevels
 from diagnosis.estimation.levenberg_marquardt import iterate_broyden
 from diagnosis.estimation.model_set import ModelSet
-from diagnosis.estimation.noise_level import INITIAL_LEVELS, disturbance_units
+from diagnosis.estimation.noise_level import ORDINARY_LEVEL, disturbance_units
 from diagnosis.model.candidate import Candidate
 from diagnosis.model.parameter_vector import extend_vector, vector_of
 from diagnosis.model.placed_effect import DISTURBANCE_STATE, PlacedEffect
 
-SMALL_LEVEL = INITIAL_LEVELS[0]
-"""Level of the other disturbances, in their units."""
 INITIAL_LEVEL = 10.0
 WIDE_LEVELS = (1.0, 100.0, 1000.0)
 """Levels that are tried before the parameters are fitted:
@@ -39,7 +37,7 @@ def free_disturbance(
     """Return the model with the disturbance of `placed_effect` free and its parameters fitted.
 
     It has the effects of the base; a disturbance that the model set lacks is added. The other
-    disturbances stay at `SMALL_LEVEL` (0.1 units), with None all of them; the free level is the
+    disturbances stay at `ORDINARY_LEVEL` (0.1 units), with None all of them; the free level is the
     best of `WIDE_LEVELS` and `INITIAL_LEVEL`, then of `NEAR_LEVELS`. The fit starts from the better
     one of the parameters of the base and the declared ones, because the fit of a deficient base may
     be far off, and takes at most `MAX_ITERATIONS` (3) steps. It is stored in the fit cache. The
@@ -65,7 +63,7 @@ def _fit_free_disturbance(
     """Return the fit of a candidate with the disturbance of `placed_effect` free."""
     name = placed_effect.qualified_name(DISTURBANCE_STATE) if placed_effect else None
     units = disturbance_units(candidate, model_set.series, base.values(0))
-    levels = dict.fromkeys(units, SMALL_LEVEL) | ({name: INITIAL_LEVEL} if name else {})
+    levels = dict.fromkeys(units, ORDINARY_LEVEL) | ({name: INITIAL_LEVEL} if name else {})
     noise_levels = with_disturbance_levels(base.noise_levels, units, levels)
     scans = []
     start = extend_vector(candidate, base.candidate, base.point, {})

@@ -38,10 +38,9 @@ from diagnosis.pipeline.decision import decide
 from diagnosis.pipeline.diagnosis_case import Case, build_model_set, read_series
 from diagnosis.result.effect_naming import named_effect_of, verdict_id
 from diagnosis.result.verdict import DecisionOutcome, NamedEffect, RankedCandidate, Verdict
-from diagnosis.selection.candidate_search import CandidateFit, LogCallback
-from diagnosis.selection.confusion_set import near_best
+from diagnosis.selection.candidate_search import CandidateFit
 from diagnosis.selection.forward_selection import Selection
-from diagnosis.selection.intersample import recalibrate_by_hold
+from diagnosis.selection.intersample import LogCallback
 from diagnosis.validation.free_simulation import compare_misfits
 from diagnosis.validation.misfit import Misfit
 from diagnosis.validation.oscillation import Oscillation, analyse_oscillation
@@ -94,8 +93,7 @@ def diagnose(case: Case, log: LogCallback = lambda text: None) -> Diagnosis:
         [one for path in case.train for one in read_series(path, case, automaton, seen)]
     )
     raw = build_model_set(case, automaton, series, seen)
-    recalibrated = recalibrate_by_hold(raw, log)
-    decision = decide(case, raw, recalibrated, log)
+    decision = decide(case, raw, log)
     model_set, selection, locations = decision.model_set, decision.selection, decision.locations
     plan = plan_experiment(model_set, _models_to_discriminate(selection, automaton))
     if plan is not None:
@@ -105,7 +103,6 @@ def diagnose(case: Case, log: LogCallback = lambda text: None) -> Diagnosis:
     )
     if decision.outcome == "unknown":
         candidates = _candidates_above(selection, decision.thresholds.default)
-        selection = dataclasses.replace(selection, rivals=near_best(candidates))
         locations = rank_causes_first(
             locations, [place_path(one.placed_effect) for one in candidates], model_set
         )
@@ -177,10 +174,7 @@ def _candidates_above(selection: Selection, min_gain: float) -> list[CandidateFi
     best score first.
     """
     rounds = selection.first_round
-    near = [
-        one for one in rounds if one.likelihood_gain and one.likelihood_gain.penalised > min_gain
-    ]
-    return sorted(near, key=lambda one: -one.score)
+    return [one for one in rounds if one.gain > min_gain]
 
 
 def _models_to_discriminate(
@@ -238,16 +232,28 @@ def _rank_candidates(selection: Selection, automaton: Automaton) -> tuple[Ranked
     probabilities = selection.probabilities()
     found: dict[tuple[str, str], RankedCandidate] = {}
     for tried in selection.first_round:
-        if tried.likelihood_gain is None:
+        if tried.estimate is None:
             continue
-        name, each = _verdict_name(tried.placed_effect, automaton), tried.likelihood_gain
-        std = float(np.std(each.by_recording) * np.sqrt(len(each.by_recording)))
-        new = RankedCandidate(*name, probabilities[tried.placed_effect.id], each.penalised, std)
+        name = _verdict_name(tried.placed_effect, automaton)
+        each = probabilities[tried.placed_effect.id]
+        std = _gain_std(selection.base, tried.estimate)
+        new = RankedCandidate(*name, each, tried.gain, std)
         old = found.setdefault(name, new)
         if old is not new:
             both = old.probability + new.probability
             found[name] = dataclasses.replace(old, probability=both)
     return tuple(found.values())
+
+
+def _gain_std(base: Estimate, model: Estimate) -> float:
+    """Return the standard deviation [nats] of a gain over recordings: that of one times their root.
+
+    The gain of a recording is half its reduction of squared innovations over the variances.
+    """
+    variances = model.prediction.variances
+    before, after = base.prediction.runs.squared_sums, model.prediction.runs.squared_sums
+    gains = 0.5 * np.sum((before - after) / variances, axis=1)
+    return float(np.std(gains) * np.sqrt(len(gains)))
 
 
 def _name_rivals(selection: Selection, automaton: Automaton) -> tuple[NamedEffect, ...]:

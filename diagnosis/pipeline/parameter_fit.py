@@ -20,8 +20,7 @@ from diagnosis.model.parameter import FreeParameter
 from diagnosis.model.parameter_text import format_value
 from diagnosis.model.parameter_vector import vector_of
 from diagnosis.pipeline.diagnosis_case import Case, build_model_set, file_digests, read_series
-from diagnosis.selection.candidate_search import LogCallback
-from diagnosis.selection.intersample import best_hold, recalibrate_by_hold
+from diagnosis.selection.intersample import LogCallback, fit_base
 from diagnosis.validation.free_simulation import compare_misfits
 from diagnosis.validation.misfit import Misfit
 from language.loading.load import automaton_of
@@ -121,9 +120,7 @@ def fit(
     series = share_period(
         [one for path in case.train for one in read_series(path, case, automaton, seen)]
     )
-    model_set, estimate = best_hold(
-        recalibrate_by_hold(build_model_set(case, automaton, series, seen), log)
-    )
+    model_set, estimate = fit_base(build_model_set(case, automaton, series, seen), log)
     if not estimate.candidate.free_parameters:
         raise ValueError(f"no parameter of `{automaton.name}` has a `range` to be fitted in")
     start = vector_of(estimate.candidate, len(model_set.series), {})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from diagnosis.criterion.explained_share import MIN_SHARE
 from diagnosis.criterion.threshold import Thresholds
 from diagnosis.data_quality.finding import format_findings
 from diagnosis.estimation.quantity import Quantity
@@ -13,13 +14,7 @@ from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.number_text import format_quantity
 from diagnosis.result.effect_naming import verdict_id
 from diagnosis.result.verdict import NamedEffect
-from diagnosis.selection.candidate_search import (
-    ENTRY_THRESHOLD,
-    MAX_FITS,
-    PRUNING_FRACTION,
-    CandidateFit,
-)
-from diagnosis.selection.confusion_set import CONFUSION_GAIN, is_confusable
+from diagnosis.selection.candidate_search import MIN_SCREENING_GAIN, CandidateFit
 from diagnosis.selection.forward_selection import Selection
 from diagnosis.validation.misfit import Misfit
 
@@ -193,39 +188,23 @@ def format_reason(
 ) -> str:
     """Return why a candidate was accepted or not; `rank` is its index in the table.
 
-    The cases in order: accepted, a rival, not fitted (and why), a gain not above its threshold in
-    training or on parts left out, nothing accepted, and less than (or for `rank` 0 not needed
-    beside) what was accepted.
+    The cases in order: accepted, a rival, not fitted, a gain not above its threshold, nothing
+    accepted, and less than (or for `rank` 0 not needed beside) what was accepted.
     """
     ids = {one.placed_effect.id for one in selection.accepted}
     if candidate_fit.placed_effect.id in ids:
         return "accepted"
     if candidate_fit.placed_effect.id in {one.placed_effect.id for one in selection.rivals}:
-        if not selection.accepted:
-            return "the nearest, but not what is missing"
-        if is_confusable(candidate_fit, selection.accepted[0]):
-            return f"cannot be told from the accepted one: within {CONFUSION_GAIN:g} nats of it"
-        return "may be it as well: gains nearly as much as the best"
-    known = candidate_fit.likelihood_gain
-    if known is None:
-        if candidate_fit.screening_gain < ENTRY_THRESHOLD:
-            return f"not fitted: gains less than {ENTRY_THRESHOLD:g} nats in screening"
-        best = max(
-            (t.likelihood_gain.penalised for t in selection.first_round if t.likelihood_gain),
-            default=0.0,
-        )
-        if candidate_fit.screening_gain < PRUNING_FRACTION * best:
-            part = f"{100 * PRUNING_FRACTION:g} % of another's gain"
-            return f"not fitted: gains less than {part} in screening"
-        return f"not fitted: {MAX_FITS} others gain more in screening"
+        return "cannot be told from the accepted one"
+    if not candidate_fit.is_fitted:
+        return f"not fitted: gains less than {MIN_SCREENING_GAIN:g} nats in screening"
     threshold = thresholds.threshold_of(candidate_fit.placed_effect)
-    if known.penalised <= threshold:
-        return f"gains less than {threshold:.0f} nats in training"
-    if known.cross_validated <= threshold:
-        return f"gains less than {threshold:.0f} nats on parts that were left out"
+    if candidate_fit.gain <= threshold:
+        return f"gains less than {threshold:.0f} nats"
+    share = f"explains {100.0 * max(candidate_fit.share, 0.0):.0f} % of what is unexplained"
     if not selection.accepted:
-        return "ranked behind one that was not accepted"
-    return "explains less than what was accepted" if rank else "not needed beside the others"
+        return f"{share}, {100.0 * MIN_SHARE:.0f} % are needed"
+    return f"{share}, less than what was accepted" if rank else "not needed beside the others"
 
 
 def candidate_title(placed_effect: PlacedEffect, report: DiagnosisReport) -> str:

@@ -62,7 +62,7 @@ def _location_card(report: DiagnosisReport) -> Card:
 
 def _confidence_card(report: DiagnosisReport, selection: Selection) -> Card:
     """Return the card on probabilities, gains and the confirmation."""
-    fitted = [one for one in selection.first_round if one.likelihood_gain]
+    fitted = [one for one in selection.first_round if one.is_fitted]
     count = f"{len(selection.first_round)} candidates, {len(fitted)} fitted in full"
     lines = []
     if selection.accepted:
@@ -75,11 +75,11 @@ def _confidence_card(report: DiagnosisReport, selection: Selection) -> Card:
         lines.append(f"{report.case.thresholds.text} nats are needed")
     else:
         lines.append(f"none of {count}, gains enough")
-        best = max(fitted, key=_smaller_gain, default=None)
+        best = max(fitted, key=lambda one: one.gain, default=None)
         if best is not None:
             lines += [
                 f"best: {_format_gain(best)}",
-                f"{report.case.thresholds.text} nats are needed in both",
+                f"{report.case.thresholds.text} nats are needed",
             ]
     confirmed = {
         True: "better on recordings that were held out, too",
@@ -89,17 +89,12 @@ def _confidence_card(report: DiagnosisReport, selection: Selection) -> Card:
     return Card("How sure", (*lines, confirmed) if confirmed else tuple(lines))
 
 
-def _smaller_gain(candidate_fit: CandidateFit) -> float:
-    """Return the smaller gain [nats] of a candidate, 0 if it was not fitted."""
-    return candidate_fit.likelihood_gain.smaller if candidate_fit.likelihood_gain else 0.0
-
-
 def _format_gain(candidate_fit: CandidateFit) -> str:
-    """Return both gains of a candidate as text."""
-    assert candidate_fit.likelihood_gain
-    known = candidate_fit.likelihood_gain
-    gains = f"{known.penalised:.0f} nats in training, {known.cross_validated:.0f} left out"
-    return f"{candidate_fit.placed_effect.id}: {gains}"
+    """Return the gain and the explained share of a candidate as text."""
+    share = 100.0 * max(candidate_fit.share, 0.0)
+    return (
+        f"{candidate_fit.placed_effect.id}: {candidate_fit.gain:.0f} nats, explains {share:.0f} %"
+    )
 
 
 def _improvement_card(report: DiagnosisReport) -> Card:

@@ -80,8 +80,8 @@ class CandidateRow:
 
     effect: str
     place: str
-    train: str
-    left_out: str
+    gain: str
+    share: str
     probability: str
     bar: float
     reason: str
@@ -96,8 +96,8 @@ def candidate_rows(report: DiagnosisReport, selection: Selection) -> list[Candid
     """
     ids = {one.placed_effect.id for one in selection.accepted}
     first = [one for one in selection.first_round if one.placed_effect.id not in ids]
-    listed = [one for one in (*selection.accepted, *first) if one.likelihood_gain]
-    most = max([one.likelihood_gain.penalised for one in listed if one.likelihood_gain] + [1.0])
+    listed = [one for one in (*selection.accepted, *first) if one.is_fitted]
+    most = max([one.gain for one in listed] + [1.0])
     shares = selection.probabilities()
     return [_candidate_row(report, selection, one, k, most, shares) for k, one in enumerate(listed)]
 
@@ -111,8 +111,7 @@ def _candidate_row(
     shares: Mapping[str, float],
 ) -> CandidateRow:
     """Return the row of a candidate at a rank."""
-    assert candidate_fit.likelihood_gain
-    known, share = candidate_fit.likelihood_gain, shares.get(candidate_fit.placed_effect.id)
+    share = shares.get(candidate_fit.placed_effect.id)
     is_accepted = candidate_fit.placed_effect.id in {
         one.placed_effect.id for one in selection.accepted
     }
@@ -125,10 +124,10 @@ def _candidate_row(
     return CandidateRow(
         effect,
         place,
-        _format_nats(known.penalised),
-        _format_nats(known.cross_validated),
+        _format_nats(candidate_fit.gain),
+        f"{100.0 * max(candidate_fit.share, 0.0):.0f} %",
         "" if share is None else format_probability(share),
-        100.0 * max(known.penalised, 0.0) / largest,
+        100.0 * max(candidate_fit.gain, 0.0) / largest,
         reason,
         is_accepted,
     )
@@ -150,7 +149,7 @@ def unfitted_candidates(
     found: dict[str, list[str]] = {}
     ids = {one.placed_effect.id for one in selection.accepted}
     for tried in selection.first_round:
-        if not tried.likelihood_gain and tried.placed_effect.id not in ids:
+        if not tried.is_fitted and tried.placed_effect.id not in ids:
             why = sentences.format_reason(tried, 0, selection, report.case.thresholds)
             found.setdefault(why, []).append(sentences.candidate_title(tried.placed_effect, report))
     return list(found.items())

@@ -1,107 +1,72 @@
-"""Inter-sample behaviour: the base recalibrated with held inputs and with linear ones.
+"""Inter-sample behaviour: the base fitted with held and with linear inputs, and the better one.
 
-Which one holds cannot always be determined before missing physics is found, because half a sample
-is a delay as well.
+A base that lacks physics often chooses the wrong one, because half a sample is a delay as well. The
+choice is therefore made by fits in which a disturbance of a balance is free.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable
 from functools import partial
 
-from diagnosis.criterion.threshold import Thresholds
-from diagnosis.data.sampled_recording import require_equal_periods, resample
+import numpy as np
+
+from diagnosis.data.sampled_recording import SampledRecording, require_equal_periods, resample
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.initial_input import average_initial_inputs, choose_initial_inputs
+from diagnosis.estimation.innovations import measured_noise_levels
+from diagnosis.estimation.levenberg_marquardt import estimate_parameters
 from diagnosis.estimation.model_set import ModelSet
-from diagnosis.estimation.noise_level import (
-    disturbance_units,
-    fit_base,
-    fit_with_noise,
-    recalibrate,
-)
-from diagnosis.model.parameter_vector import extend_vector
-from diagnosis.selection.candidate_search import CandidateFit, LogCallback
-from diagnosis.selection.forward_selection import Selection, select_effects
+from diagnosis.estimation.noise_level import HUBER_STDS, ORDINARY_LEVEL, disturbance_units
+from diagnosis.localisation.disturbance_state_fit import free_disturbance
+from diagnosis.model.candidate import Candidate
 
-RecalibratedSet = tuple[ModelSet, Estimate]
+LogCallback = Callable[[str], None]
+FittedBase = tuple[ModelSet, Estimate]
 
 
-def recalibrate_by_hold(
-    model_set: ModelSet, log: LogCallback = lambda text: None
-) -> list[RecalibratedSet]:
-    """Return model sets with decimated recordings and their recalibrated bases, in the order of
-    trial.
+def fit_base(model_set: ModelSet, log: LogCallback = lambda text: None) -> FittedBase:
+    """Return the model set with decimated recordings and the base fitted to them.
 
-    First-order hold comes first; zero-order hold is added if the base fits better with it.
+    The noise of the signals is the measured one, and each balance has an ordinary disturbance of
+    `ORDINARY_LEVEL` (0.1 units); these levels are held. Inputs are linear or constant between
+    samples, whichever costs less with the best free disturbance of a balance. Huber limits are
+    `HUBER_STDS` (4) robust standard deviations of the innovations of a first fit without limits.
+    Raises ValueError if the rates of the recordings differ or the model cannot be linearised.
     """
-    firsts = []
-    for is_linear in (True, False):
-        paced_ones = resample(
-            model_set.series, model_set.automaton, model_set.output_names, is_linear
-        )
-        require_equal_periods(paced_ones)
-        own = tuple(average_initial_inputs(one) for one in paced_ones)
-        way = dataclasses.replace(model_set, series=own)
-        candidate = way.compile_candidate(())
-        units = disturbance_units(candidate, own, {})
-        make = partial(fit_base, candidate, own, units)
-        first = way.load_or_fit("first fit", candidate, [units], make)
-        way = dataclasses.replace(way, series=choose_initial_inputs(first, own))
-        firsts.append((way, first, units))
-    straight, held = firsts
-    if straight[1].negative_log_likelihood <= held[1].negative_log_likelihood:
-        firsts = [straight]
-    found = []
-    for way, first, units in firsts:
-        make = partial(recalibrate, first, way.series, units)
-        given = [first.point, first.noise_levels, units]
-        found.append((way, way.load_or_fit("recalibrated", first.candidate, given, make)))
-    for way, base in found:
-        text = "straight between samples" if way.series[0].is_first_order_hold else "held"
-        log(f"recalibrated, inputs {text}: {base.cost:.0f} nats")
-    is_straight = best_hold(found)[0].series[0].is_first_order_hold
-    return found[:1] if is_straight else found
+    by_hold = [_fit_with_hold(model_set, is_linear) for is_linear in (True, False)]
+    paced, first = min(by_hold, key=_flexible_cost)
+    limits = HUBER_STDS * np.maximum(first.prediction.robust_std(), 1e-12)
+    noise_levels = dataclasses.replace(first.noise_levels, huber_limits=limits)
+    fit = partial(estimate_parameters, first.candidate, paced.series, noise_levels, first.point)
+    base = paced.load_or_fit("base", first.candidate, [first.point, noise_levels], fit)
+    text = "linear between samples" if paced.series[0].is_first_order_hold else "held"
+    log(f"base fitted, inputs {text}: {base.cost:.0f} nats")
+    return paced, base
 
 
-def best_hold(recalibrated: Sequence[RecalibratedSet]) -> RecalibratedSet:
-    """Return the model set whose base has the larger likelihood."""
-    return min(recalibrated, key=lambda way: way[1].negative_log_likelihood)
+def _fit_with_hold(model_set: ModelSet, is_linear: bool) -> FittedBase:
+    """Return the model set with one inter-sample behaviour and a first fit of the base."""
+    series = resample(model_set.series, model_set.automaton, model_set.output_names, is_linear)
+    require_equal_periods(series)
+    averaged = tuple(average_initial_inputs(one) for one in series)
+    paced = dataclasses.replace(model_set, series=averaged)
+    candidate = paced.compile_candidate(())
+    fit = partial(_first_fit, candidate, averaged)
+    first = paced.load_or_fit("first fit", candidate, [], fit)
+    return dataclasses.replace(paced, series=choose_initial_inputs(first, averaged)), first
 
 
-def select_hold(
-    recalibrated: Sequence[RecalibratedSet],
-    thresholds: Thresholds,
-    log: LogCallback = lambda text: None,
-) -> tuple[ModelSet, Estimate, Selection]:
-    """Return the model set, base and selection with the smallest cost.
-
-    After a selection with accepted effects, another inter-sample behaviour is tried only if the
-    model with these effects fits better with it.
-    """
-    found: list[tuple[float, ModelSet, Estimate, Selection]] = []
-    known: tuple[CandidateFit, ...] = ()
-    for model_set, base in recalibrated:
-        if any(not _is_improved_by(model_set, base, selection) for *_, selection in found):
-            continue
-        units = disturbance_units(base.candidate, model_set.series, base.values(0))
-        selection = select_effects(model_set, base, units, thresholds, log, earlier=known)
-        known = selection.first_round if selection.accepted else ()
-        cost = selection.model.cost + thresholds.default * len(selection.accepted)
-        found.append((cost, model_set, base, selection))
-    _, model_set, base, selection = min(found, key=lambda one: one[0])
-    return model_set, base, selection
+def _first_fit(candidate: Candidate, series: tuple[SampledRecording, ...]) -> Estimate:
+    """Return the base fitted from its declared values, without Huber limits."""
+    units = disturbance_units(candidate, series, {})
+    ordinary = {name: ORDINARY_LEVEL * unit for name, unit in units.items()}
+    return estimate_parameters(candidate, series, measured_noise_levels(series, ordinary), {})
 
 
-def _is_improved_by(model_set: ModelSet, base: Estimate, selection: Selection) -> bool:
-    """Tell whether what was accepted in another way fits better in this one; nothing may."""
-    candidate = model_set.try_compile([tried.placed_effect for tried in selection.accepted])
-    if candidate is None or not selection.accepted:
-        return True
-    model = selection.model
-    units = disturbance_units(base.candidate, model_set.series, base.values(0))
-    start = extend_vector(candidate, model.candidate, model.point, {})
-    given = (model.noise_levels, start, units)
-    make = partial(fit_with_noise, candidate, model_set.series, *given)
-    return model_set.load_or_fit("settled", candidate, given, make).cost < model.cost
+def _flexible_cost(fitted: FittedBase) -> float:
+    """Return the least cost [nats] of a base in which one balance has a free disturbance."""
+    model_set, first = fitted
+    costs = [free_disturbance(model_set, first, one).cost for one in model_set.disturbances]
+    return min(costs, default=first.cost)

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.data.stacked_recordings import burn_in_samples
 from diagnosis.estimation.estimate import Estimate, evaluate
-from diagnosis.estimation.noise_level import INITIAL_LEVELS, disturbance_units, fit_with_noise
+from diagnosis.estimation.levenberg_marquardt import estimate_parameters
+from diagnosis.estimation.noise_level import ORDINARY_LEVEL, disturbance_units
 from diagnosis.localisation.disturbance_state_fit import (
     ALL_LEVELS,
-    SMALL_LEVEL,
     scan_level,
     with_disturbance_levels,
 )
@@ -30,8 +30,6 @@ MARGIN = 0.5
 """Time [s] before and after an active interval that does not count as inactive."""
 MIN_DURATION = 2.0
 """Shortest inactive interval [s]; the observer must find the states in it."""
-START_LEVELS = (INITIAL_LEVELS[0], INITIAL_LEVELS[-1])
-"""Levels of all disturbances from which the fits start."""
 MIN_INACTIVE_FRACTION = 1.0 / 3.0
 """Smallest fraction of the samples that is inactive, for parameters to follow from it."""
 
@@ -50,18 +48,12 @@ def refit_on_inactive_intervals(
     units = disturbance_units(model.candidate, series, model.values(0))
     recording_indices = [places.index(r) if r in places else 0 for r in range(len(series))]
     start = ParameterVector(model.point.shared, model.point.per_recording[places])
-    fits = []
-    for level in START_LEVELS:
-        noise_levels = with_disturbance_levels(
-            model.noise_levels, units, dict.fromkeys(units, level)
-        )
-        fits.append(fit_with_noise(model.candidate, pieces, noise_levels, start, units))
-    best = min(fits, key=lambda one: one.cost)
-    point = ParameterVector(best.point.shared, best.point.per_recording[recording_indices])
-    small_noise = with_disturbance_levels(
-        model.noise_levels, units, dict.fromkeys(units, SMALL_LEVEL)
+    ordinary = with_disturbance_levels(
+        model.noise_levels, units, dict.fromkeys(units, ORDINARY_LEVEL)
     )
-    free = evaluate(model.candidate, series, small_noise, point)
+    best = estimate_parameters(model.candidate, pieces, ordinary, start)
+    point = ParameterVector(best.point.shared, best.point.per_recording[recording_indices])
+    free = evaluate(model.candidate, series, ordinary, point)
     return scan_level(free, series, units, name, ALL_LEVELS)
 
 

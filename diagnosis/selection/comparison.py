@@ -1,0 +1,116 @@
+"""Comparison: base, effects and free disturbances, judged by one criterion (docs/method.md).
+
+A round compares all candidates beside a base. Its best effect is accepted if it gains enough and
+explains most of what any disturbance explains; the next round has the accepted effect in its base.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
+from diagnosis.criterion.explained_share import (
+    MAX_ORDINARY_ENERGY,
+    explained_share,
+    least_variances,
+    remaining_energy,
+)
+from diagnosis.data.array_types import Reals
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.model_set import ModelSet
+from diagnosis.localisation.disturbance_state_fit import free_disturbance
+from diagnosis.localisation.ranking import disturbance_locations
+from diagnosis.model.parameter_vector import extend_vector
+from diagnosis.model.placed_effect import PlacedEffect
+from diagnosis.selection.candidate_search import CandidateFit, search_candidates
+from diagnosis.selection.intersample import LogCallback
+
+
+@dataclass(frozen=True)
+class Round:
+    """The candidates beside a base, the largest gain first, then those that were not fitted.
+
+    `floor` (channels,) are the least mean-square innovations of all models of the round, `energy`
+    is what the base leaves above them. `free` are the fits of the base with a free disturbance, by
+    place; `correlation` is the number of samples that count as one.
+    """
+
+    base: Estimate = field(repr=False)
+    free: Mapping[str, Estimate] = field(repr=False)
+    candidates: tuple[CandidateFit, ...]
+    floor: Reals = field(repr=False)
+    energy: float
+    correlation: float
+
+    @property
+    def is_ordinary(self) -> bool:
+        """Whether what the base leaves may be an ordinary disturbance."""
+        return self.energy <= MAX_ORDINARY_ENERGY * len(self.floor)
+
+    @property
+    def total_gain(self) -> float:
+        """The gain [nats] of the model of least cost over the base."""
+        fits = [one.estimate.cost for one in self.candidates if one.estimate is not None]
+        least = min([self.base.cost, *fits, *(one.cost for one in self.free.values())])
+        return (self.base.cost - least) / self.correlation
+
+
+def compare_candidates(
+    model_set: ModelSet,
+    base: Estimate,
+    placed_effects: Iterable[PlacedEffect],
+    log: LogCallback = lambda text: None,
+) -> Round:
+    """Return the comparison of effects beside a base.
+
+    A base that is fitted by simulation without an observer has no free disturbance; there the noise
+    of the signals is the floor.
+    """
+    is_simulated = base.noise_levels.is_output_error
+    places = () if is_simulated else disturbance_locations(model_set)
+    free = {
+        f"{section}.{one.place}": free_disturbance(model_set, base, one) for section, one in places
+    }
+    flexible = min(free.values(), key=lambda one: one.cost, default=base)
+    start = extend_vector(base.candidate, flexible.candidate, flexible.point, {})
+    found = search_candidates(model_set, base, placed_effects, start, log)
+    fits = [one.estimate for one in found if one.estimate is not None]
+    floor = least_variances([base, *free.values(), *fits])
+    if is_simulated:
+        floor = np.minimum(floor, base.noise_levels.outputs**2)
+    best = min([base, *fits], key=lambda one: one.cost)
+    correlation = integrated_autocorrelation(best, model_set.series)
+    recordings = len(model_set.series)
+    judged = [
+        replace(
+            one,
+            gain=effective_gain(one.estimate, base, correlation, recordings),
+            share=explained_share(one.estimate, base, floor),
+        )
+        if one.estimate is not None
+        else one
+        for one in found
+    ]
+    judged.sort(key=lambda one: -one.gain)
+    energy = remaining_energy(base, floor)
+    return Round(base, free, tuple(judged), floor, energy, correlation)
+
+
+def effective_gain(model: Estimate, base: Estimate, correlation: float, recordings: int) -> float:
+    """Return the gain [nats] of a model over a base that it extends, less the price of parameters.
+
+    `correlation` is the number of samples that count as one; the price is log(n) / 2 for each of
+    the additional parameters, n effective samples. A parameter per recording counts for each.
+    """
+    count = float(np.sum(model.prediction.counts)) / correlation
+    added = _parameter_count(model, recordings) - _parameter_count(base, recordings)
+    return (base.cost - model.cost) / correlation - added / 2 * math.log(max(count, 2.0))
+
+
+def _parameter_count(model: Estimate, recordings: int) -> int:
+    """Return the number of parameters, those per recording counted for each recording."""
+    return sum(recordings if one.per_recording else 1 for one in model.candidate.free_parameters)
