@@ -26,16 +26,6 @@ def integrated_autocorrelation(model: Estimate, series: Sequence[SampledRecordin
     return _integrated_autocorrelation(model.prediction.innovations, float(series[0].period))
 
 
-def integrated_autocorrelation_by_recording(
-    model: Estimate, series: Sequence[SampledRecording]
-) -> Reals:
-    """Return the integrated autocorrelation of each recording (recordings,)."""
-    period = float(series[0].period)
-    return np.array(
-        [_integrated_autocorrelation([one], period) for one in model.prediction.innovations]
-    )
-
-
 def _integrated_autocorrelation(innovations: Sequence[Reals], period: float) -> float:
     """Return the integrated autocorrelation over some recordings;
     unknown innovations are dropped.

@@ -14,10 +14,8 @@ from diagnosis.estimation.innovations import (
     KalmanGains,
     NoiseLevels,
     PredictionResult,
-    noise_levels_at,
     predict,
     predict_at_points,
-    predict_with_gains,
 )
 from diagnosis.estimation.jacobian import Jacobian, difference_jacobian
 from diagnosis.estimation.kalman_gain import kalman_gains
@@ -55,10 +53,6 @@ def share_operating_points(
         return prediction
     whole = dataclasses.replace(mine, states=states, modes=theirs.modes)
     return dataclasses.replace(prediction, runs=dataclasses.replace(prediction.runs, stacked=whole))
-
-
-LOG_LEVEL_STEP = 0.05
-"""Step of the logarithm of a noise level for a finite difference."""
 
 
 @dataclass(frozen=True)
@@ -152,7 +146,7 @@ def with_normal_equations(
     """Return an estimate with the Jacobian and the normal equations at its point.
 
     Columns given in `jacobian` (by name, of a similar model) are used as they are; those of other
-    parameters and noise levels are computed by finite differences. The point, gains, cost and
+    parameters are computed by finite differences. The point, gains, cost and
     prediction do not change.
     """
 
@@ -161,57 +155,10 @@ def with_normal_equations(
 
     candidate, prediction = estimate.candidate, estimate.prediction
     jacobian = jacobian or {}
-    fresh = [one.name for one in candidate.compiled.free_parameters if one.name not in jacobian]
+    fresh = [one.name for one in candidate.free_parameters if one.name not in jacobian]
     columns = {**jacobian, **difference_jacobian(candidate, estimate.point, prediction, run, fresh)}
-    columns |= _noise_parameter_jacobian(
-        estimate, series, [o.name for o in candidate.noise_parameters if o.name not in jacobian]
-    )
     normal = normal_equations_of(candidate, prediction, columns)
     return dataclasses.replace(estimate, normal_equations=normal, jacobian=columns)
-
-
-def _noise_parameter_jacobian(
-    estimate: Estimate, series: Sequence[SampledRecording], names: Sequence[str]
-) -> Jacobian:
-    """Return the derivatives of the innovations with respect to the named noise levels.
-
-    Each difference uses the Kalman gains that belong to the changed level; unknown values are 0.
-    """
-    candidate, jacobian = estimate.candidate, {}
-    places = [candidate.names.index(name) for name in names]
-    moved = [
-        estimate.point.perturb(
-            candidate, k, LOG_LEVEL_STEP / candidate.free_parameters[k].prior_std
-        )
-        for k in places
-    ]
-    gains = [gains_at(estimate, series, there) for there in moved]
-    values = all_values_at(candidate, estimate.point)[: len(series)]
-    runs = predict_with_gains(candidate, series, values, gains, estimate.noise_levels.huber_limits)
-    for name, k, there, run in zip(names, places, moved, runs, strict=True):
-        changes = (run.stacked - estimate.prediction.stacked) / (
-            there.shared[k] - estimate.point.shared[k]
-        )
-        jacobian[name] = np.where(np.isfinite(changes), changes, 0.0)
-    return jacobian
-
-
-def gains_at(
-    estimate: Estimate, series: Sequence[SampledRecording], point: ParameterVector
-) -> KalmanGains:
-    """Return the Kalman gains for the noise levels at a point.
-
-    Without noise parameters these are the gains of the estimate. Otherwise they are computed for
-    the operating points of the estimate and its values of the first recording: the point changes
-    the noise levels only.
-    """
-    if not estimate.candidate.noise_parameters:
-        return estimate.gains
-    noise_levels, values = (
-        noise_levels_at(estimate.candidate, point, estimate.noise_levels),
-        estimate.values(0),
-    )
-    return kalman_gains(estimate.candidate, series, values, noise_levels, estimate.prediction)
 
 
 def predict_at(

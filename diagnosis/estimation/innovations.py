@@ -6,10 +6,9 @@ candidate itself, so a wrong model cannot use the gain of another one.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -22,16 +21,6 @@ from diagnosis.data.noise_estimate import MAD_TO_STD
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.data.stacked_recordings import stack_recordings
 from diagnosis.model.candidate import Candidate
-from diagnosis.model.parameter_vector import ParameterVector, values_at
-
-PROCESS_NOISE_NAME, OUTPUT_NOISE_NAME, INPUT_NOISE_NAME = (
-    "level of {}",
-    "noise of {}",
-    "noise of inputs",
-)
-"""Names of noise parameters: of a disturbance state, of an output, of all inputs."""
-FOLDS = 5
-"""Number of folds of the cross-validation: every fifth block in time of each recording."""
 
 
 @dataclass(frozen=True)
@@ -60,18 +49,6 @@ class KalmanGains:
 
     transient: Reals
     steady_state: Reals
-
-
-@dataclass(frozen=True)
-class FoldBlock:
-    """A block of consecutive innovations of one recording, and the fold to which it belongs.
-
-    `part` is a slice of the stacked innovations.
-    """
-
-    recording: int
-    fold: int
-    part: slice
 
 
 @dataclass(frozen=True)
@@ -107,15 +84,6 @@ class PredictionResult:
         """The innovations of each recording after its burn-in, (samples, outputs) each."""
         return tuple(self.stacked[part] for part in self.slices)
 
-    @cached_property
-    def blocks(self) -> list[FoldBlock]:
-        """The blocks for cross-validation: `FOLDS` (5) of nearly equal length for each recording.
-
-        They are in order of time; block k of recording r belongs to the fold (r + k) modulo
-        `FOLDS`.
-        """
-        return _fold_blocks(self._edges)
-
     @property
     def _edges(self) -> tuple[int, ...]:
         """The start of each recording in the stacked innovations, and the end of the last one."""
@@ -131,16 +99,6 @@ class PredictionResult:
         if not self.is_complete:
             return np.inf
         return float((0.5 * self.counts * np.log(self.variances)).sum())
-
-    @cached_property
-    def robust_squares(self) -> Reals:
-        """The squares of the stacked innovations, linear beyond the Huber limits, (n, outputs).
-
-        Beyond a limit h the value of e is h (2 |e| - h) (Huber 1964); NaN stays NaN.
-        """
-        size = np.abs(self.stacked)
-        near = np.minimum(size, self.huber_limits)
-        return np.asarray(near * (2.0 * size - near), dtype=np.float64)
 
     def robust_std(self) -> Reals:
         """Return 1.4826 times the median magnitude of the innovations of each output (outputs,).
@@ -219,34 +177,6 @@ def measured_noise_levels(
     return NoiseLevels(outputs, np.median(inputs, axis=0), process, np.full(len(outputs), np.inf))
 
 
-def noise_levels_at(
-    candidate: Candidate, point: ParameterVector, noise_levels: NoiseLevels
-) -> NoiseLevels:
-    """Return noise levels with those that are noise parameters of the candidate set from a point.
-
-    The others stay as in `noise_levels`, which is returned itself without noise parameters. The
-    noise of all inputs is scaled by one factor, so that the largest one is the parameter's value.
-    """
-    if not candidate.noise_parameters:
-        return noise_levels
-    values = values_at(candidate, point, 0)
-    levels = {
-        name: values.get(PROCESS_NOISE_NAME.format(name)) for name in candidate.disturbance_states
-    }
-    drifts = {name: level for name, level in levels.items() if level is not None}
-    signals = zip(candidate.predictor.outputs, noise_levels.outputs, strict=True)
-    seen = np.array([values.get(OUTPUT_NOISE_NAME.format(name), noise) for name, noise in signals])
-    largest = np.max(noise_levels.inputs, initial=0.0)
-    inputs = (
-        noise_levels.inputs * (values[INPUT_NOISE_NAME] / largest)
-        if INPUT_NOISE_NAME in values
-        else noise_levels.inputs
-    )
-    return dataclasses.replace(
-        noise_levels, process={**noise_levels.process, **drifts}, outputs=seen, inputs=inputs
-    )
-
-
 def predict(
     candidate: Candidate,
     series: Sequence[SampledRecording],
@@ -295,52 +225,6 @@ def predict_at_points(
         candidate.compiled.substeps,
     )
     return [Innovations(*run, recorded, huber_limits, predictor) for run in zip(*runs, strict=True)]
-
-
-def predict_with_gains(
-    candidate: Candidate,
-    series: Sequence[SampledRecording],
-    values: Sequence[Mapping[str, float]],
-    gains: Sequence[KalmanGains],
-    huber_limits: Reals,
-) -> list[Innovations]:
-    """Return the innovations of recordings at one point for each of several Kalman gains.
-
-    They are in the order of `gains`. Gains with equally long transients run in parallel SIMD lanes;
-    states are not stored.
-    """
-    stacked = stack_recordings(series)
-    recorded, predictor = stacked.recorded, candidate.predictor
-    pages, results = (
-        candidate.calibration_pages(values, stacked.first_measured),
-        dict[int, Innovations](),
-    )
-    for count in {len(one.transient) for one in gains}:
-        indices = [k for k, one in enumerate(gains) if len(one.transient) == count]
-        runs = predictor.predict_points(
-            np.repeat(pages[np.newaxis], len(indices), axis=0),
-            recorded,
-            np.array([gains[k].transient for k in indices]),
-            np.array([gains[k].steady_state for k in indices]),
-            candidate.compiled.substeps,
-        )
-        for k, run in zip(indices, zip(*runs, strict=True), strict=True):
-            results[k] = Innovations(*run, recorded, huber_limits, predictor)
-    return [results[k] for k in range(len(gains))]
-
-
-@lru_cache
-def _fold_blocks(edges: tuple[int, ...]) -> list[FoldBlock]:
-    """Return recordings with such edges cut into `FOLDS` blocks each.
-
-    Block k of recording r belongs to the fold (r + k) modulo `FOLDS`.
-    """
-    found = []
-    for r, (start, stop) in enumerate(pairwise(edges)):
-        cuts = np.linspace(0, stop - start, FOLDS + 1).astype(int) + start
-        parts = [slice(low, high) for low, high in pairwise(cuts.tolist())]
-        found += [FoldBlock(r, (r + k) % FOLDS, part) for k, part in enumerate(parts)]
-    return found
 
 
 def _stack_after_burn_in(

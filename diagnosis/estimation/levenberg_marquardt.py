@@ -18,11 +18,10 @@ from diagnosis.estimation.estimate import (
     Estimate,
     evaluate,
     evaluate_near,
-    gains_at,
-    predict_at,
+    predict_with_gains_of,
     with_normal_equations,
 )
-from diagnosis.estimation.innovations import NoiseLevels, noise_levels_at
+from diagnosis.estimation.innovations import NoiseLevels
 from diagnosis.estimation.jacobian import Jacobian, broyden_update
 from diagnosis.estimation.normal_equations import damped_step, predicted_gain
 from diagnosis.model.candidate import Candidate
@@ -298,14 +297,11 @@ def search_damping(
         ):
             damping *= 10.0
             continue
-        gains = gains_at(estimate, series, point)
-        prediction = predict_at(estimate.candidate, series, point, gains, estimate.noise_levels)
+        prediction = predict_with_gains_of(estimate, series, point)
         cost = prediction.negative_log_likelihood() + point.prior_cost(estimate.candidate)
         if cost < estimate.cost:
-            noise_levels = noise_levels_at(estimate.candidate, point, estimate.noise_levels)
-            better = Estimate(estimate.candidate, point, cost, prediction, gains, noise_levels)
             better = dataclasses.replace(
-                better, normal_equations=estimate.normal_equations, jacobian=estimate.jacobian
+                estimate, point=point, cost=cost, prediction=prediction, exhausted_jacobian=None
             )
             return better, max(damping / 10.0, 1e-9)
         damping *= 10.0

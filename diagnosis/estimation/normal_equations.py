@@ -1,4 +1,4 @@
-"""Normal equations: J'J and J'e of a fit by blocks of recordings, and damped steps from them."""
+"""Normal equations: J'J and J'e of a fit by recordings, and damped steps from them."""
 
 from __future__ import annotations
 
@@ -15,43 +15,29 @@ from diagnosis.model.candidate import Candidate
 from diagnosis.model.parameter_vector import ParameterVector, bounds_of, per_recording_mask
 
 Sums = tuple[Reals, Reals]
-"""J'J (n, n) and J'e (n,), summed over some blocks."""
+"""J'J (n, n) and J'e (n,)."""
 
 
 @dataclass(frozen=True)
 class NormalEquations:
-    """Weighted normal equations by blocks: `a` (blocks, n, n) = J'WJ and `g` (blocks, n) = J'We.
+    """Weighted normal equations: `a` (recordings, n, n) = J'WJ and `g` (recordings, n) = J'We.
 
-    Priors are not included. `own` (n,) marks coordinates per recording, `of` (blocks,) is the
-    recording of each block and `fold` (blocks,) its fold in the cross-validation.
+    Priors are not included. `own` (n,) marks coordinates per recording.
     """
 
     a: Reals
     g: Reals
     own: NDArray[np.bool_]
-    of: NDArray[np.int64]
-    fold: NDArray[np.int64]
-
-    def without_fold(self, fold: int) -> NormalEquations:
-        """Return the equations of all blocks that are not in a fold."""
-        kept = self.fold != fold
-        return NormalEquations(self.a[kept], self.g[kept], self.own, self.of[kept], self.fold[kept])
 
     @cached_property
     def total(self) -> Sums:
-        """The sums of `a` (n, n) and `g` (n,) over all blocks."""
+        """The sums of `a` (n, n) and `g` (n,) over all recordings."""
         return self.a.sum(axis=0), self.g.sum(axis=0)
 
     @cached_property
     def by_recording(self) -> dict[int, Sums]:
-        """The sums of `a` and `g` over the blocks of each recording, by its index.
-
-        Empty without coordinates per recording; a recording without blocks is left out.
-        """
-        if not self.own.any():
-            return {}
-        here = {int(r): self.of == r for r in np.unique(self.of)}
-        return {r: (self.a[of].sum(axis=0), self.g[of].sum(axis=0)) for r, of in here.items()}
+        """`a` and `g` of each recording by its index; empty without coordinates per recording."""
+        return dict(enumerate(zip(self.a, self.g, strict=True))) if self.own.any() else {}
 
 
 def normal_equations_of(
@@ -60,10 +46,10 @@ def normal_equations_of(
     """Return the normal equations of a prediction for all coordinates of a candidate.
 
     The weights are the inverse mean squares of outputs, divided by |e| / limit beyond the Huber
-    limit. Unknown innovations have the weight 0. There is one equation for each cross-validation
-    block of the prediction. `jacobian` must have every coordinate of the candidate.
+    limit. Unknown innovations have the weight 0. `jacobian` must have every coordinate of the
+    candidate.
     """
-    blocks, innovation = prediction.blocks, prediction.stacked
+    innovation = prediction.stacked
     known = np.isfinite(innovation)
     far = np.maximum(np.abs(innovation) / prediction.huber_limits, 1.0)
     weight = np.where(known, 1.0 / prediction.variances / far, 0.0)
@@ -73,14 +59,13 @@ def normal_equations_of(
     changes = np.empty((count, innovation.size))
     for name, row in zip(candidate.names, changes, strict=True):
         np.multiply(jacobian[name], root, out=row.reshape(innovation.shape))
-    a = np.zeros((len(blocks), count, count))
-    g = np.zeros((len(blocks), count))
-    for place, block in enumerate(blocks):
-        part = slice(seen * block.part.start, seen * block.part.stop)
+    recordings = len(prediction.slices)
+    a, g = np.zeros((recordings, count, count)), np.zeros((recordings, count))
+    for place, rows in enumerate(prediction.slices):
+        part = slice(seen * rows.start, seen * rows.stop)
         a[place] = changes[:, part] @ changes[:, part].T
         g[place] = changes[:, part] @ errors[part]
-    of, fold = [np.array([getattr(b, name) for b in blocks]) for name in ("recording", "fold")]
-    return NormalEquations(a, g, per_recording_mask(candidate), of, fold)
+    return NormalEquations(a, g, per_recording_mask(candidate))
 
 
 def damped_step(
@@ -93,8 +78,7 @@ def damped_step(
     """Return the point after one Levenberg-Marquardt step, clipped to the bounds.
 
     A shared coordinate at its bound that the step would push further is fixed, and the step is
-    solved again (active set). With `per_recording_only` all shared coordinates are fixed. If
-    `normal` has no block of a recording, the coordinates of that recording do not move.
+    solved again (active set). With `per_recording_only` all shared coordinates are fixed.
     """
     bounds = bounds_of(candidate)
     held = np.full(len(point.shared), per_recording_only)
@@ -120,9 +104,7 @@ def predicted_gain(
 
     The decrease of the prior cost is included; the result is negative if the cost increases.
     """
-    step = np.where(
-        normal.own, (end.per_recording - start.per_recording)[normal.of], end.shared - start.shared
-    )
+    step = np.where(normal.own, end.per_recording - start.per_recording, end.shared - start.shared)
     slope = normal.g + 0.5 * (normal.a @ step[:, :, None])[:, :, 0]
     return start.prior_cost(candidate) - end.prior_cost(candidate) - float(np.sum(slope * step))
 

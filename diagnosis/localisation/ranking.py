@@ -11,7 +11,6 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.localisation.cause import attribute_causes, balance_of, is_inactive
@@ -19,9 +18,6 @@ from diagnosis.localisation.disturbance_state_fit import free_disturbance
 from diagnosis.localisation.location import Location, location_of, with_smoothed_disturbances
 from diagnosis.model.placed_effect import PlacedEffect, disturbance_effect
 from language.text.document import MappingNode
-
-ABSORBED_FRACTION = 0.3
-"""Weight of the gain that the small disturbances of the base absorb as well."""
 
 
 def localise(model_set: ModelSet, base: Estimate) -> tuple[Location, ...]:
@@ -48,20 +44,6 @@ def localise(model_set: ModelSet, base: Estimate) -> tuple[Location, ...]:
             ranked.append(dataclasses.replace(location, gain=restricted_cost - one.cost))
     ranked.sort(key=lambda location: -location.gain)
     return tuple([with_smoothed_disturbances(model_set, ranked[0]), *ranked[1:]] if ranked else [])
-
-
-def unexplained_gain(model_set: ModelSet, base: Estimate, locations: Sequence[Location]) -> float:
-    """Return the effective log-likelihood gain [nats] of the best location.
-
-    It is the largest gain (0 without locations). The part that the base absorbs with its own small
-    disturbances is weighted by `ABSORBED_FRACTION` (0.3), because every model has some disturbance.
-    The result is divided by the integrated autocorrelation of the innovations.
-    """
-    gain = max((location.gain for location in locations), default=0.0)
-    taken_up = min(max(0.0, free_disturbance(model_set, base).cost - base.cost), gain)
-    return (gain - (1.0 - ABSORBED_FRACTION) * taken_up) / integrated_autocorrelation(
-        base, model_set.series
-    )
 
 
 def disturbance_locations(model_set: ModelSet) -> list[tuple[str, PlacedEffect]]:

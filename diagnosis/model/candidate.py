@@ -37,20 +37,16 @@ INITIAL_VALUE_NAME = "start_of_{}"
 
 @dataclass(frozen=True)
 class Candidate:
-    """A compiled model: the effects placed on the base, its metadata and its predictor.
-
-    `noise_parameters` are the noise levels that a fit estimates together with the parameters.
-    """
+    """A compiled model: the effects placed on the base, its metadata and its predictor."""
 
     placed_effects: tuple[PlacedEffect, ...]
     compiled: CompiledModel
     predictor: Predictor
-    noise_parameters: tuple[FreeParameter, ...] = ()
 
-    @cached_property
+    @property
     def free_parameters(self) -> tuple[FreeParameter, ...]:
-        """The free parameters of a fit: the parameters of the model, then the noise parameters."""
-        return self.compiled.free_parameters + self.noise_parameters
+        """The free parameters of a fit."""
+        return self.compiled.free_parameters
 
     @cached_property
     def names(self) -> tuple[str, ...]:

@@ -27,7 +27,7 @@ from language.overlays.effect_reader import Effect, EffectApplication, added_nam
 from language.overlays.expand_document import Project, read_document
 from language.overlays.name_types import formula_entries
 from language.text.diagnostic import Problems, Source, Span
-from language.text.document import Document, MappingNode, ScalarNode
+from language.text.document import Document
 
 DISTURBANCE_STATE = "drift"
 
@@ -88,17 +88,6 @@ def has_parameters(placed_effect: PlacedEffect) -> bool:
     An effect without parameters could not be fitted: it would follow every signal.
     """
     return placed_effect.effect.body.get("parameters") is not None
-
-
-def varies_slowly(placed_effect: PlacedEffect) -> bool:
-    """Return whether a parameter of an effect may change slowly along a recording.
-
-    This is so if its `form` is one of `SLOWLY_VARYING_FORMS`.
-    """
-    known = placed_effect.effect.body.get("parameters")
-    entries = known if isinstance(known, MappingNode) else ()
-    forms = [one.node.get("form") for one in entries if isinstance(one.node, MappingNode)]
-    return any(isinstance(one, ScalarNode) and one.text in SLOWLY_VARYING_FORMS for one in forms)
 
 
 def read_effects(folder: Path) -> tuple[Effect, ...]:

@@ -15,7 +15,7 @@ from diagnosis.estimation.levenberg_marquardt import iterate, refine
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.model.candidate import Candidate
 from diagnosis.model.parameter_vector import ParameterVector, extend_vector, vector_of
-from diagnosis.model.placed_effect import PlacedEffect, effect_names
+from diagnosis.model.placed_effect import PlacedEffect
 from diagnosis.selection.intersample import LogCallback
 from diagnosis.selection.screening import screen_candidate
 
@@ -51,18 +51,6 @@ class CandidateFit:
         """The cost [nats] of the fit; infinite without one."""
         return math.inf if self.estimate is None else self.estimate.cost
 
-    @property
-    def shared_values(self) -> dict[str, float]:
-        """The fitted values [SI] of the effect's shared parameters; empty if it was not fitted."""
-        if self.estimate is None:
-            return {}
-        values, own = self.estimate.values(0), effect_names(self.placed_effect)
-        return {
-            one.name: values[one.name]
-            for one in self.estimate.candidate.free_parameters
-            if one.name in own and not one.per_recording
-        }
-
 
 def search_candidates(
     model_set: ModelSet,
@@ -75,8 +63,9 @@ def search_candidates(
 
     Effects that the base has, and those that cannot be combined with it, are left out. A candidate
     is fitted fully if its screening gains `MIN_SCREENING_GAIN` (2 nats); beside accepted effects
-    these are at most `MAX_FITS_BESIDE` (8). The others follow by descending screening gain. `flexible` is the vector of the base with a free disturbance, from
-    which a poor fit is repeated. Noise levels are those of the base.
+    these are at most `MAX_FITS_BESIDE` (8). The others follow by descending screening gain.
+    `flexible` is the vector of the base with a free disturbance, from which a poor fit is repeated.
+    Noise levels are those of the base.
     """
     present = {one.id for one in base.candidate.placed_effects}
     new = [one for one in placed_effects if one.id not in present]

@@ -12,15 +12,12 @@ from diagnosis.criterion.explained_share import MIN_SHARE, log_form_weight, rema
 from diagnosis.criterion.threshold import DEFAULT_THRESHOLDS, Thresholds
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.model_set import ModelSet
-from diagnosis.model.placed_effect import has_parameters
 from diagnosis.selection.candidate_search import CandidateFit
 from diagnosis.selection.comparison import Round, compare_candidates
 from diagnosis.selection.intersample import LogCallback
 
 MAX_EFFECTS = 3
 """Largest number of accepted effects."""
-MAX_REPLACEMENTS = 4
-"""Candidates that are tried in the place of an accepted effect, those of largest gain."""
 SET_PROBABILITY = 0.95
 """Probability of the set of an effect and its rivals."""
 
@@ -45,11 +42,6 @@ class Selection:
     def first_round(self) -> tuple[CandidateFit, ...]:
         """All candidates beside the base, the largest gain first."""
         return self.first.candidates
-
-    @property
-    def has_unknown_input(self) -> bool:
-        """Whether an unknown input, which has no parameters, was accepted."""
-        return any(not has_parameters(one.placed_effect) for one in self.accepted)
 
     def probabilities(self) -> dict[str, float]:
         """Return the probability of each fitted candidate beside the base by id, and of `other`."""

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.criterion.threshold import Thresholds
 from diagnosis.data.sampled_recording import SampledRecording, resample
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.levenberg_marquardt import estimate_parameters
@@ -23,14 +22,6 @@ INITIAL_SHIFT = 0.01
 """How far states are moved at the start, as a part of their ranges."""
 MAX_REMAINING_SHIFT = 0.01
 """Part of the largest difference of two runs that may be left in the second half of a recording."""
-OUTPUT_ERROR_THRESHOLDS = Thresholds(
-    {}, 30.0, "the usual threshold of whole simulations", mode_factor=1.0
-)
-"""What an effect must gain: what a simulation misses hangs together, so few samples count."""
-CROSS_VALIDATED_FRACTION = 0.5
-"""Part of it that must be gained left out: what an event shows the rest of a drive may not know."""
-OUTPUT_ERROR_SCREENING_FRACTION = 0.1
-"""Part of it that a candidate must promise to be fitted: a gap that gains 49 nats promised 7.4."""
 
 
 @dataclass(frozen=True)
