@@ -8,7 +8,6 @@ import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
 
 from diagnosis.criterion.threshold import DEFAULT_THRESHOLDS, Thresholds
 from diagnosis.data.sampled_recording import SampledRecording, sample_windows
@@ -23,9 +22,6 @@ from language.model.system import RecordingMap
 from language.overlays.effect_reader import Effect
 from language.overlays.expand_document import Project
 from language.text.document import Document
-
-BootstrapMode = Literal["never", "kept", "made"]
-"""Whether bootstrap thresholds are used: never, if an earlier bootstrap stored them, or always."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +41,6 @@ class Case:
     held_out: tuple[Path, ...] = ()
     effects: tuple[Effect, ...] | None = None
     thresholds: Thresholds = DEFAULT_THRESHOLDS
-    bootstrap: BootstrapMode = "never"
     names: Mapping[Path, str] = field(default_factory=dict)
     recordings: Mapping[Path, Recording] = field(default_factory=dict, repr=False)
     opened_recordings: dict[Path, Recording] = field(default_factory=dict, repr=False)

@@ -6,7 +6,7 @@ import dataclasses
 import os
 import shutil
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from diagnosis.criterion.threshold import (
@@ -22,7 +22,7 @@ from diagnosis.data_quality.recording_check import used_columns
 from diagnosis.model.effect_folder import explain_unplaceable, load_effects
 from diagnosis.model.effect_library import library_effects
 from diagnosis.pipeline.diagnose import diagnose as run_diagnosis
-from diagnosis.pipeline.diagnosis_case import BootstrapMode, Case, file_digests
+from diagnosis.pipeline.diagnosis_case import Case, file_digests
 from diagnosis.pipeline.parameter_fit import Fit, fit as fit_case
 from diagnosis.pipeline.usable_recordings import LazyRecordings, select_usable
 from diagnosis.report.diagnosis_report import DiagnosisReport, undecided_verdict, unusable_reasons
@@ -55,16 +55,10 @@ from modewright.runtime.output_files import OutputError, make_folder, remove_fil
 
 Report = Callable[[str], None]
 """A function that is called with each line of progress."""
-CACHED = "kept"
-"""The word for the thresholds of an earlier bootstrap."""
 CHECKPOINT_FOLDER = "stages"
 """The folder of checkpoints in a folder of results; an interrupted diagnosis continues from it."""
-THRESHOLD_WORDS: Mapping[str, BootstrapMode] = {
-    CACHED: "kept",
-    "bootstrap": "made",
-    "usual": "never",
-}
-"""The words for thresholds with the mode of the bootstrap; other texts are files."""
+USUAL = "usual"
+"""The word for the default thresholds; other texts are files."""
 
 
 class BudgetSpent(Exception):
@@ -110,7 +104,7 @@ def diagnose(
     effects: PathText | None = None,
     root: PathText | None = None,
     *,
-    thresholds: PathText = CACHED,
+    thresholds: PathText = USUAL,
     out: PathText | None = None,
     budget: float | None = None,
     anyway: bool = False,
@@ -121,8 +115,7 @@ def diagnose(
     `train` are the recordings to explain, `held_out` those for the validation only; a recording
     that is named twice or in both raises ValueError, and so does an empty `train`. `map` is the map
     of recordings (default: that of the spec). `effects` is a folder of effects instead of those of
-    the project and of the library. `thresholds` are `kept` (of an earlier bootstrap, else the
-    defaults), `bootstrap` (computed if there are none), `usual` (the defaults) or a file.
+    the project and of the library. `thresholds` are `usual` (the defaults) or a file.
 
     Recordings with errors are left out, unless `anyway`; if none remains, or after `budget` seconds
     without a verdict, the verdict is `unknown`. With `out` the results are written there as by
@@ -136,14 +129,13 @@ def diagnose(
     tell = time_budget.report
     map_name, threshold_text = optional(to_text, map, "map"), to_text(thresholds, "thresholds")
     require_disjoint(files, held_out_files)
-    bootstrap, limits = _read_thresholds(threshold_text)
+    limits = _read_thresholds(threshold_text)
     checked = check_recordings(files, map_name, spec, root=root)
     case, automaton = _build_case(spec, files, held_out_files, checked, effect_folder, project)
     stages = _checkpoint_folder(folder)
     case = dataclasses.replace(
         case,
         thresholds=limits,
-        bootstrap=bootstrap,
         checkpoint_folder=stages,
         before_fit=time_budget.check,
     )
@@ -311,14 +303,13 @@ def _build_case(
     return case, automaton
 
 
-def _read_thresholds(thresholds: str) -> tuple[BootstrapMode, Thresholds]:
-    """Return the mode of the bootstrap and the initial thresholds. Raises ValueError."""
-    if thresholds in THRESHOLD_WORDS:
-        return THRESHOLD_WORDS[thresholds], DEFAULT_THRESHOLDS
+def _read_thresholds(thresholds: str) -> Thresholds:
+    """Return the default thresholds, or those of a file. Raises ValueError."""
+    if thresholds == USUAL:
+        return DEFAULT_THRESHOLDS
     if not Path(thresholds).is_file():
-        words = ", ".join(THRESHOLD_WORDS)
-        raise ValueError(f"thresholds `{thresholds}`: neither one of {words} nor a file")
-    return "never", read_thresholds(Path(thresholds))
+        raise ValueError(f"thresholds `{thresholds}`: neither `{USUAL}` nor a file")
+    return read_thresholds(Path(thresholds))
 
 
 def _load_effects(folder: Path | None, project: Project) -> tuple[Effect, ...]:

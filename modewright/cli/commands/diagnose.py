@@ -49,7 +49,7 @@ Thresholds = Annotated[
     str,
     typer.Option(
         "--thresholds",
-        help="acceptance thresholds: kept (of an earlier bootstrap), bootstrap, usual, or a file",
+        help="acceptance thresholds: usual, or a file",
     ),
 ]
 Budget = Annotated[str, typer.Option("--budget", help="time limit: '90 s', '10min'")]
@@ -67,7 +67,7 @@ def diagnose(
     held_out: HeldOut = None,
     mapping: Map = None,
     effects: Effects = None,
-    thresholds: Thresholds = "kept",
+    thresholds: Thresholds = "usual",
     budget: Budget = "10min",
     anyway: Anyway = False,
     fail_on: FailOn = None,
@@ -81,7 +81,7 @@ def diagnose(
     \b
     modewright diagnose blind_driveline --train runs/*.csv --held-out c.csv --out found
     modewright diagnose emps --train run.csv --map my_columns --effects my_effects --out found
-    modewright diagnose plant.yaml --train a.csv --train b.csv --thresholds bootstrap --out found
+    modewright diagnose plant.yaml --train a.csv --train b.csv --out found
     modewright diagnose plant.yaml --train night.csv --out found --fail-on effect --json
     """
     from modewright.api.diagnosis import diagnose as run_diagnosis
