@@ -95,7 +95,8 @@ def _beside(every: Sequence[Answer], seed: int) -> list[str]:
         f"with the label in {chance:.1%} of the cases (mean of {TIMES} permutations).",
         "The second control names the most frequent effect in every case. This name is right in "
         f"{majority_rate(full).text} cases.",
-        "The first simpler method only fits the parameters of the base. It never names an effect.",
+        "The first simpler method fits the parameters of the base and does nothing else. "
+        "It therefore never names an effect.",
     ]
     for method, words in (
         (
