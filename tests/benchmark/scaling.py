@@ -66,10 +66,12 @@ WHY = {
     "mode. Modewright computes these eigenvalues with scalar operations in a fixed order and not "
     "with a library of linear algebra, so that the result has the same bits on every machine. The "
     "cost of the eigenvalues is cubic in the number of states. At 64 states they take half of the "
-    "time of *run again*. The compiled C has one line for each operation.",
+    "time of *run again*. The C has one line for each operation, so the time of *compiled* also "
+    "grows with the number of states.",
     "modes": "Each mode has its own equations and its own integration step in the C. No part of "
-    "the computation handles pairs of modes. Below ten modes the start of the compiler takes most "
-    "of the time of *compiled*.",
+    "the computation examines every pair of modes. Therefore no time grows with the square of the "
+    "number of modes. Below ten modes the start of the compiler takes most of the time of "
+    "*compiled*.",
     "seconds": "In each row, lowering the spec and printing the C take about 0.1 s. The memory "
     "contains the recorded rows and the plan of the simulation. The plan lists all instants with "
     "their actions, such as the ticks of the estimator.",
@@ -251,7 +253,7 @@ def page(found: Mapping[str, Sequence[Point]]) -> str:
         "a study. [The glossary](glossary.md) explains the terms.",
         'The command `make bench ARGS="--growth"` measures the figures. It measures each row of a '
         "table in a separate process. The times are processor times, except in the table of "
-        "workers. The memory is the largest memory of this process.",
+        "workers. The column *memory* contains the largest memory of the process of the row.",
         f"The machine has {os.cpu_count()} cores. Other load on the machine changes the figures.",
         "",
         "![Time and memory over the size](growth.png)",
