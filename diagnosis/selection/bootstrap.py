@@ -27,10 +27,11 @@ from diagnosis.estimation.innovations import measured_noise_levels
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.estimation.noise_level import fit_with_noise
 from diagnosis.model.candidate import compile_candidate
-from diagnosis.model.compile_cache import cache_key, node_text, write_atomically
+from diagnosis.model.compile_cache import cache_key, node_text
 from diagnosis.selection.candidate_search import CandidateFit, LogCallback, search_candidates
 from diagnosis.selection.forward_selection import rescreen_after_refit
 from diagnosis.selection.replicate import simulate_replicate
+from language.text.temporary_files import write_atomically
 
 REPLICATES = 14
 """Simulated sets of recordings; each costs a recalibration and a search."""
