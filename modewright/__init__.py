@@ -5,6 +5,7 @@ The public API. A name is imported at its first use, so that `import modewright`
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -36,6 +37,12 @@ if TYPE_CHECKING:
     from modewright.api.traceability import trace
     from modewright.diagram.diagram import Diagram, graph
     from modewright.render.study_page import study_report
+
+if not os.path.isdir(os.path.dirname(__file__)):
+    # Specs, C sources and templates are read as files, also by compilers and worker processes.
+    raise ImportError(
+        "modewright needs to be installed; it cannot run from a zip archive", name=__name__
+    )
 
 __all__ = [
     "CalibrationPage",

@@ -9,7 +9,6 @@ a corpus reaches.
 from __future__ import annotations
 
 import struct
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
@@ -33,6 +32,7 @@ from codegen.toolchain.compiler import FLAGS, BuildError
 from codegen.toolchain.external_tools import output_of
 from language.ir.program import Constant, Program
 from language.ir.traversal import walk_ops
+from language.text.temporary_files import temporary_folder
 
 MAIN = HarnessMain("coverage/explore_main.c.jinja")
 MAX_PAGE_CHANGES, MAX_TICK_GROUPS = 4, 96
@@ -60,8 +60,7 @@ def generate_corpus(
     ranges of inputs by name; others have DEFAULT_INPUT_RANGE. Raises MissingToolError; BuildError
     if compilation fails or a sanitizer reports a finding.
     """
-    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
-        folder = Path(name)
+    with temporary_folder() as folder:
         sources = write_explorer(program, ranges, folder)
         flags = [flag for flag in FLAGS if flag != "-O2"]
         command = [FUZZER_COMPILER, *flags, "-O1", "-fsanitize=fuzzer", *map(str, sources)]

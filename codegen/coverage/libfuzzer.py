@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 import re
 import struct
-import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +19,7 @@ from codegen.harness.harness import HarnessMain, tick_inputs, write_harness
 from codegen.harness.sanitizers import build_sanitised, run_sanitised
 from language.ir.number_type import MAX_FINITE
 from language.ir.program import Program, Variable, unqualified_name
+from language.text.temporary_files import temporary_folder
 
 FUZZER_COMPILER = "clang-19"
 WORDS_PER_INPUT, ABSOLUTE_WORDS, SPREAD_WORDS = 256, 96, 64
@@ -65,8 +65,7 @@ def run_fuzzer(
     temporary folder. Errors that a sanitizer finds are in `findings` of the result. Raises
     MissingToolError, BuildError.
     """
-    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
-        folder = Path(name)
+    with temporary_folder() as folder:
         table = word_table(program, ranges)
         sources = write_harness(program, folder, main=MAIN)
         (folder / "words.h").write_text(_format_header(table))

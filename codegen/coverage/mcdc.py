@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import re
-import tempfile
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -30,6 +29,7 @@ from codegen.toolchain.compiler import FLAGS, run_executable
 from codegen.toolchain.external_tools import output_of
 from codegen.toolchain.target_machine import HOST
 from language.ir.program import Program
+from language.text.temporary_files import temporary_folder
 
 COMPILER, PROFILE_MERGER, COVERAGE_EXPORTER = "clang-19", "llvm-profdata-19", "llvm-cov-19"
 COVERAGE_FLAGS = ("-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc")
@@ -188,8 +188,7 @@ def measure_mcdc(
     throughout. Raises MissingToolError, BuildError.
     """
     file = f"{program.name}.c"
-    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
-        folder = Path(name)
+    with temporary_folder() as folder:
         # Each run adds its counters to the profile.
         environment = {"LLVM_PROFILE_FILE": str(folder / RAW_PROFILE)}
         app = _build(write_harness(program, folder), folder, HOST.link(folder))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from codegen.toolchain.object_cache import substitute_objects
 from codegen.toolchain.target_machine import HOST, Machine, harness_file
 from codegen.toolchain.templates import render
 from language.ir.program import Constant, Program, Variable
+from language.text.temporary_files import temporary_folder
 
 HARNESS_HEADERS = ("harness.h", "cortex_m4f.h")
 """Headers of the harness that every main needs."""
@@ -121,8 +121,7 @@ def build_executable(
     If the cache cannot be used, the path is in a temporary folder that is removed at the end.
     Raises MissingToolError, BuildError.
     """
-    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
-        folder = Path(name)
+    with temporary_folder() as folder:
         sources = write_harness(program, folder, machine, main)
         command, link = machine.command(compiler_name), machine.link(folder / "harness")
         version = compiler_version(command[0])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tempfile
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from codegen.toolchain.compiler import FLAGS
 from codegen.toolchain.external_tools import ARM_COMPILER, ARM_SIZE, output_of
 from codegen.toolchain.target_machine import CORTEX_FLAGS
 from language.ir.program import Program
+from language.text.temporary_files import temporary_folder
 
 STRUCTURES = ("Self", "In", "Out")
 """The structures whose sizes are measured."""
@@ -64,8 +64,8 @@ def measure_code(program: Program) -> Metrics:
     is None. Raises MissingToolError, BuildError.
     """
     name = program.name
-    with tempfile.TemporaryDirectory(prefix="modewright-") as folder_name:
-        folder, files = Path(folder_name), emit_c_files(program)
+    with temporary_folder() as folder:
+        files = emit_c_files(program)
         probes = "".join(SIZE_PROBE.format(structure=one, name=name) for one in STRUCTURES)
         for file, text in {**files, "probe.c": f'#include "{name}.h"\n{probes}'}.items():
             (folder / file).write_text(text)

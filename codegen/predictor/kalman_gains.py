@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-import tempfile
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +17,7 @@ from codegen.toolchain.compiler import (
     flags_at_level,
 )
 from codegen.toolchain.templates import render
+from language.text.temporary_files import temporary_folder
 
 MAX_SAMPLES = 5000
 """Maximum number of samples; a gain that still changes then is taken as the steady-state gain."""
@@ -63,8 +62,8 @@ def compute_kalman_gains(
 @cache
 def _compile_recursion(states: int, outputs: int) -> Any:
     """Return the C function of the recursion for a size, compiled if it is not in the cache."""
-    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
-        source = Path(name) / "kalman_gains.c"
+    with temporary_folder() as folder:
+        source = folder / "kalman_gains.c"
         source.write_text(
             render("predictor/kalman_gains.c.jinja", {"states": states, "seen": outputs})
         )

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import ctypes
 import re
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -40,6 +39,7 @@ from codegen.toolchain.compiler import (
 )
 from codegen.toolchain.templates import render
 from language.ir.program import Program, unqualified_name
+from language.text.temporary_files import temporary_folder
 
 REMOVABLE_GROUPS = ("equation.", "work.")
 """Prefixes of variables that may be removed if nothing reads them; they have no other effect."""
@@ -380,8 +380,7 @@ def build_predictor(program: Program, columns: PredictorColumns) -> Iterator[Pat
     path is in a temporary folder that is removed at the end. Raises MissingToolError, BuildError.
     """
     program = slice_to_outputs(program)
-    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
-        folder = Path(name)
+    with temporary_folder() as folder:
         simd_context = (
             simd_recordings_context(program, columns.states, columns.outputs)
             if has_gcc_vectors()

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
 
 from codegen.emit.c_module import emit_c_files
 from codegen.harness.stack_usage import check_stack
@@ -16,6 +14,7 @@ from codegen.proofs.warnings import check_compiler_warnings
 from codegen.toolchain.tool_verdict import ToolVerdict
 from language.ir.program import Program
 from language.model.automaton import Automaton
+from language.text.temporary_files import temporary_folder
 
 CHECKS = ("warnings", "misra", "stack", "sanitizers", "values", "contract")
 """The names of all checks in their order."""
@@ -28,8 +27,7 @@ def run_checks(
 
     Raises MissingToolError, BuildError.
     """
-    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
-        folder = Path(name)
+    with temporary_folder() as folder:
         for inner in ("sanitizers", "values", "contract"):
             (folder / inner).mkdir()
         files = emit_c_files(program)

@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import ctypes
 import dataclasses
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 from codegen.emit.c_math import emit_math_files
@@ -29,6 +27,7 @@ from codegen.toolchain.compiler import FLAGS, compiler_version, find_compiler
 from codegen.toolchain.templates import render
 from language.ir.printer import digest
 from language.ir.program import Program
+from language.text.temporary_files import temporary_folder
 
 MODULE_NAME = "stepper"
 """The name of the module in C."""
@@ -159,8 +158,7 @@ def _load_stepper(stepper_key: _StepperKey, flags: tuple[str, ...]) -> LoadedSte
     """Return the loaded library of a Program, compiled if it is not in the cache."""
     program = dataclasses.replace(stepper_key.program, name=MODULE_NAME)
     files, blocks, names = _emit_files(program)
-    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
-        folder = Path(name)
+    with temporary_folder() as folder:
         for file, text in files.items():
             (folder / file).write_text(text)
         sources = sorted(folder.glob("*.c"))

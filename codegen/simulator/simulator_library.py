@@ -6,7 +6,6 @@ The call of C releases Python's global lock, so several threads may each run a p
 from __future__ import annotations
 
 import ctypes
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -26,6 +25,7 @@ from codegen.toolchain.compiler import (
 )
 from codegen.toolchain.object_cache import is_shared, object_of
 from language.programs.system_program import SimulationAssembly
+from language.text.temporary_files import temporary_folder
 
 Pointer = ctypes.c_void_p
 Int64 = ctypes.c_int64
@@ -222,8 +222,7 @@ def _load_cached(
 ) -> SimulatorLibrary:
     """Return the library of a key, from the cache of compiled programs if it was built before."""
     assembly = library_key.assembly
-    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
-        folder = Path(name)
+    with temporary_folder() as folder:
         for file, text in emit_simulator_files(assembly, library_key.simd_batch).items():
             (folder / file).write_text(text)
         sources = sorted(folder.glob("*.c"))

@@ -10,11 +10,12 @@ import hashlib
 import logging
 import os
 import stat
-import tempfile
 import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
+
+from language.text.temporary_files import write_atomically
 
 CACHE_VARIABLE = "MODEWRIGHT_CACHE"
 """The environment variable with the folder of the cache."""
@@ -165,15 +166,7 @@ def _store(built: Path, target: Path) -> None:
     data = built.read_bytes()
     digest = hashlib.sha256(data).hexdigest().encode()
     for path, content, mode in ((target, data, 0o700), (_digest_file(target), digest, 0o600)):
-        handle, name = tempfile.mkstemp(dir=target.parent)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(content)
-            os.chmod(name, mode)
-            os.replace(name, path)
-        except OSError:
-            Path(name).unlink(missing_ok=True)
-            raise
+        write_atomically(path, content, mode)
 
 
 def _digest_file(target: Path) -> Path:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TypedDict
 
 from language.text.diagnostic import MissingToolError
+from language.text.temporary_files import temporary_folder
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno")
 """The flags that define the bits of results."""
@@ -71,6 +72,17 @@ def convert_process_errors(name: str) -> Iterator[None]:
         raise BuildError(f"{name} was not done after {error.timeout:g} s") from None
     except OSError as error:
         raise BuildError(f"{name} does not run: {error}") from None
+
+
+@contextmanager
+def scratch_environment() -> Iterator[dict[str, str]]:
+    """Return a context with the environment of a process that may be killed.
+
+    Its TMPDIR is a folder that is removed at the end, with the temporary files that a killed
+    process leaves.
+    """
+    with temporary_folder() as folder:
+        yield {**os.environ, "TMPDIR": str(folder)}
 
 
 def find_compiler(name: str | None = None) -> list[str]:
@@ -132,7 +144,7 @@ def run_compilers(commands: Sequence[tuple[Sequence[str], Path]]) -> None:
     Raises BuildError like `run_compiler` for the first command of the sequence that fails; the
     other processes are killed. TIMEOUT counts for each process that is waited for.
     """
-    with ExitStack() as stack:
+    with scratch_environment() as environment, ExitStack() as stack:
         running = []
         for command, target in commands:
             with convert_process_errors("the compiler"):
@@ -140,6 +152,7 @@ def run_compilers(commands: Sequence[tuple[Sequence[str], Path]]) -> None:
                     [*command, "-o", str(target)],
                     stdout=subprocess.DEVNULL,
                     stderr=subprocess.PIPE,
+                    env=environment,
                     **AS_TEXT,
                 )
             running.append(stack.enter_context(process))

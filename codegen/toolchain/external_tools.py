@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from codegen.toolchain.compiler import AS_TEXT, BuildError, convert_process_errors
+from codegen.toolchain.compiler import (
+    AS_TEXT,
+    BuildError,
+    convert_process_errors,
+    scratch_environment,
+)
 from language.text.diagnostic import MissingToolError
 
 ARM_COMPILER = "arm-none-eabi-gcc"
@@ -54,11 +58,11 @@ def run_tool(
     MissingToolError; BuildError if it does not start, and after TOOL_TIMEOUT seconds.
     """
     tool, *words = command
-    with convert_process_errors(tool):
+    with convert_process_errors(tool), scratch_environment() as environment:
         return subprocess.run(
             [require_tool(tool), *words],
             cwd=folder,
-            env={**os.environ, "PWD": str(folder), **(extra_environment or {})},
+            env={**environment, "PWD": str(folder), **(extra_environment or {})},
             capture_output=True,
             timeout=TOOL_TIMEOUT,
             check=False,

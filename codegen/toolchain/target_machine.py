@@ -4,7 +4,6 @@ them."""
 from __future__ import annotations
 
 import subprocess
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import resources
@@ -18,6 +17,7 @@ from codegen.toolchain.compiler import (
     run_executable,
 )
 from codegen.toolchain.external_tools import ARM_COMPILER, EMULATOR, require_tool
+from language.text.temporary_files import temporary_folder
 
 CORTEX_FLAGS = ("-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")
 """Compiler flags of a Cortex-M4F."""
@@ -69,8 +69,7 @@ def run_in_qemu(target: Path, records: bytes, options: Sequence[str] = ()) -> by
     emulator = require_tool(EMULATOR)
     semihosting = ("-semihosting-config", "enable=on,target=native")
     headless = ("-nographic", "-monitor", "none", "-serial", "none")
-    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
-        folder = Path(name)
+    with temporary_folder() as folder:
         (folder / "records.in").write_bytes(records)
         command = [emulator, "-M", BOARD, *headless, *semihosting, *options, "-kernel", str(target)]
         with convert_process_errors("the emulated program"):

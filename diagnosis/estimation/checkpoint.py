@@ -23,8 +23,9 @@ from diagnosis.estimation.estimate import Estimate, predict_with_gains_of
 from diagnosis.estimation.innovations import KalmanGains, NoiseLevels
 from diagnosis.estimation.normal_equations import NormalEquations
 from diagnosis.model.candidate import Candidate
-from diagnosis.model.compile_cache import code_digest, write_atomically
+from diagnosis.model.compile_cache import code_digest
 from diagnosis.model.parameter_vector import ParameterVector
+from language.text.temporary_files import write_atomically
 
 Arrays = Mapping[str, Any]
 NORMAL_FIELDS = tuple(field.name for field in dataclasses.fields(NormalEquations))

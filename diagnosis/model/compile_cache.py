@@ -6,10 +6,11 @@ use the same candidates for many cases.
 
 from __future__ import annotations
 
+import atexit
 import dataclasses
 import hashlib
 import json
-import os
+import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -26,6 +27,7 @@ from codegen.predictor.predictor import PredictorColumns
 from codegen.toolchain.build_cache import cache_subfolder
 from diagnosis.model.parameter import FreeParameter
 from language.text.document import MappingNode, ScalarNode, SequenceNode, YamlNode
+from language.text.temporary_files import write_atomically
 
 FORMAT = "modewright-candidate/1"
 """Format and schema version of the metadata of a compiled candidate."""
@@ -109,15 +111,22 @@ def load_or_compile(
     library_digest = hashlib.sha256(data).hexdigest()
     entries = {**dataclasses.asdict(recipe), "library": library_digest}
     text = json.dumps({"format": FORMAT, **entries})
-    write_atomically(library, data)
+    write_atomically(library, data, mode=0o700)
     write_atomically(recipe_path, text.encode())
     return recipe, library
 
 
 @cache
 def _cache_folder() -> Path:
-    """Return the user's cache folder of candidates, or a temporary folder if there is none."""
-    return cache_subfolder("candidates") or Path(tempfile.mkdtemp(prefix="modewright-"))
+    """Return the user's cache folder of candidates, or a temporary folder if there is none.
+
+    The temporary folder is removed when the process ends.
+    """
+    folder = cache_subfolder("candidates")
+    if folder is None:
+        folder = Path(tempfile.mkdtemp(prefix="modewright-"))
+        atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
 
 
 @cache
@@ -168,20 +177,3 @@ def _from_json(data: dict[str, Any]) -> CompiledModel:
         tuple(data["delays"]),
         tuple(data["brought"]),
     )
-
-
-def write_atomically(path: Path, data: bytes) -> None:
-    """Write a file through a temporary file in its folder, so that no reader sees a part of it.
-
-    An existing file is replaced; the file gets mode 0700. Raises OSError (also if the folder is
-    missing); the temporary file is then removed.
-    """
-    handle, name = tempfile.mkstemp(dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        os.chmod(name, 0o700)
-        os.replace(name, path)
-    except OSError:
-        Path(name).unlink(missing_ok=True)
-        raise

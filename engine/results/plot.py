@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from engine.results.mode_band import PALETTE, ModeBand, draw_band, label_segments
+from engine.results.picture_format import PICTURE_FORMATS, picture_format
 from engine.results.sampled_run import SampledRun, matches_any
 from language.readers.mode_reader import IMPLICIT_MODE
 from language.text.arguments import PathText, to_choice, to_path
@@ -66,11 +67,11 @@ class Picture:
     figure: Figure
 
     def data(self, form: str = "png") -> bytes:
-        """Return the picture as bytes of a format of matplotlib: `png` (130 dpi), `svg`, `pdf`.
+        """Return the picture as bytes of a format in PICTURE_FORMATS; `png` has 130 dpi.
 
-        The bytes have no date. Raises ValueError for an unknown format; it names the formats.
+        The bytes have no date. Raises ValueError for another format; it names the formats.
         """
-        to_choice(form, self.figure.canvas.get_supported_filetypes(), "form")
+        to_choice(form, PICTURE_FORMATS, "form")
         buffer = io.BytesIO()
         metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form, {})
         with matplotlib.rc_context({"svg.hashsalt": "modewright"}):
@@ -78,9 +79,16 @@ class Picture:
         return buffer.getvalue()
 
     def save(self, path: PathText) -> None:
-        """Write the picture to a file, replacing it; its suffix gives the format, as in `data`."""
+        """Write the picture to a file, replacing it; its suffix gives the format.
+
+        Raises ValueError for a suffix of no format in PICTURE_FORMATS.
+        """
         file = to_path(path, "path")
-        file.write_bytes(self.data(file.suffix.lower()[1:]))
+        try:
+            form = picture_format(file)
+        except ValueError as error:
+            raise ValueError(f"`path` is {error}") from None
+        file.write_bytes(self.data(form))
 
     def _repr_png_(self) -> bytes:
         """Return the picture as PNG for a notebook."""

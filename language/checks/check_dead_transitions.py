@@ -101,7 +101,7 @@ def check_close_waits(automaton: Automaton, query_engine: QueryEngine, problems:
                 times = [f"{float(time) * 1e3:g} ms" for time in (second, first, automaton.period)]
                 label = f"{times[0]} are nearer to the {times[1]} of `{earlier.name}` "
                 label += f"than a period of {times[2]}"
-                hint = "which of them elapses first may differ between simulation and target"
+                hint = "both may elapse in the same tick; then the smaller `priority` fires"
                 assert later.wait
                 problems.warning("near", _span_of(later, later.wait), label, hint)
 

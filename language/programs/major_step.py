@@ -4,10 +4,10 @@ The block `step` is X_Step in C: it integrates over the step under the inputs of
 then latches the present inputs and takes the transitions that they enable. The engine runs the same
 blocks one by one, so it observes each event and computes the same bits:
 
-    limit     set `work.h` to the rest of the step, or to the earliest end of a wait
-    flow      (continuous_program.py) integrate over `work.h` or up to the first crossing
-    elapse    subtract the elapsed time from `work.left` and the waits; set `work.event`
-    settle    run micro-steps until no transition is enabled
+    limit         set `work.h` to the rest of the step, or to the earliest end of a wait
+    flow          (continuous_program.py) integrate over `work.h` or up to the first crossing
+    advance_time  subtract the elapsed time from `work.left` and the waits; set `work.event`
+    macro_step    run micro-steps until no transition is enabled
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import NoReturn, TypeVar
 
 from language.text.project_files import Project
+from language.text.sanitise import truncate
 
 PathText = str | os.PathLike[str]
 """A name or a path: a text, or a path object such as `pathlib.Path`."""
@@ -40,16 +41,28 @@ def to_text(value: object, name: str, expected: str = "a name or path (str or Pa
 
 
 def to_path(value: object, name: str) -> Path:
-    """Return a path."""
-    return Path(to_text(value, name))
+    """Return a path; ValueError for a text with a NUL character, which no path has."""
+    text = to_text(value, name)
+    if "\0" in text:
+        raise ValueError(f"`{name}` is a path, not {reprlib.repr(text)}: it has a NUL character")
+    return Path(text)
 
 
 def to_project(root: object, texts: Mapping[Path, str] | None = None) -> Project:
     """Return the project in the folder `root`; None is the working folder.
 
-    `texts` are those of `Project`.
+    `texts` are those of `Project`. ValueError if `root` is no existing folder.
     """
-    return Project(optional(to_path, root, "root") or Path(), texts or {})
+    return Project(Path() if root is None else _to_folder(root, "root"), texts or {})
+
+
+def _to_folder(value: object, name: str) -> Path:
+    """Return the path of an existing folder; ValueError for another path."""
+    folder = to_path(value, name)
+    if not os.path.isdir(folder):
+        reason = "this is no folder" if os.path.exists(folder) else "there is none"
+        raise ValueError(f"`{name}` is an existing folder, not {truncate(str(folder))}: {reason}")
+    return folder
 
 
 def to_texts(value: object, name: str) -> tuple[str, ...]:

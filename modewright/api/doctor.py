@@ -5,12 +5,13 @@ from __future__ import annotations
 import logging
 import platform
 import sys
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import Literal
+
+from language.text.temporary_files import temporary_folder
 
 MIN_PYTHON = (3, 11)
 """The oldest supported version of Python."""
@@ -98,8 +99,8 @@ def _run_self_test() -> HealthCheck:
     from modewright.api.new_project import write_skeleton
     from modewright.api.simulation import lockstep
 
-    with tempfile.TemporaryDirectory(prefix="modewright-") as folder:
-        root = Path(folder) / "project"
+    with temporary_folder() as folder:
+        root = folder / "project"
         write_skeleton("self_test", root)
         try:
             trajectory, verdicts = lockstep("self_test", "cold_day", root=root)

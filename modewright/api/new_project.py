@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 import shutil
 import tempfile
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 
 from language.text.arguments import PathText, to_path, to_text
+from language.text.temporary_files import postpone_signals
 from modewright.runtime.output_files import OutputError
 
 NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}", re.ASCII)
@@ -52,11 +54,21 @@ def write_skeleton(name: str, folder: PathText) -> list[Path]:
         raise ValueError(f"`{name}` cannot be the name of a system: letters, digits and _")
     if folder.exists():
         raise OutputError(f"{folder}: it is there already")
+    with postpone_signals():
+        _write_files(skeleton_files(name), folder)
+    return [folder / place for place in TEMPLATE_TARGETS.values()]
+
+
+def _write_files(files: Mapping[str, str], folder: Path) -> None:
+    """Write texts by relative path into a new folder; it appears complete or not at all.
+
+    Raises OutputError.
+    """
     temporary_folder = None
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         temporary_folder = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
-        for place, text in skeleton_files(name).items():
+        for place, text in files.items():
             path = temporary_folder / place
             path.parent.mkdir(exist_ok=True)
             path.write_text(text, "utf-8")
@@ -67,4 +79,3 @@ def write_skeleton(name: str, folder: PathText) -> list[Path]:
     finally:
         if temporary_folder is not None:
             shutil.rmtree(temporary_folder, ignore_errors=True)
-    return [folder / place for place in TEMPLATE_TARGETS.values()]

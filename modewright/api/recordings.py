@@ -66,6 +66,7 @@ class CheckedRecordings:
         """
         from diagnosis.data_quality.recording_figure import draw_recordings
 
+        title = to_text(title, "title", "a text")
         names = ", ".join(recording.name for recording in self.recordings)
         return draw_recordings(self.recordings, self.check, title or names)
 

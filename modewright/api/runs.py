@@ -60,6 +60,9 @@ def _trajectory_of(run: Run, name: str, root: PathText | None = None) -> Traject
     text = to_text(run, name, "a trajectory, a path or `system:scenario`")
     if Path(text).suffix.lower() in FORMATS:
         return read_run(Path(text))
+    side_of = Path(text.removesuffix(".json"))
+    if text.endswith(".json") and side_of.suffix.lower() == ".csv":
+        raise ValueError(f"`{text}` is the side file of a run: name the run, {side_of}")
     system, colon, scenario = text.rpartition(":")
     if not colon or not system or not scenario:
         raise ValueError(f"`{text}` is neither a .csv or .parquet file nor system:scenario")
@@ -85,6 +88,7 @@ def plot(
 
     patterns = optional(to_some_texts, signals, "signals") or ()
     window = optional(to_time_window, span, "span")
+    title = to_text(title, "title", "a text")
     runs = [_trajectory_of(run, "run")]
     names = [run_label(run, "A")]
     if other is not None:

@@ -19,9 +19,10 @@ from language.overlays.calibration import read_calibration
 from language.overlays.effect_reader import read_effect
 from language.overlays.expand_document import Project, add_calibrations, expand_document
 from language.programs.solved_numbers_report import format_method_lines
-from language.text.arguments import PathText, to_path, to_project, to_text
-from language.text.diagnostic import Problem, Problems, SpecError, sort_problems
+from language.text.arguments import PathText, to_project, to_text
+from language.text.diagnostic import Problem, Problems, Source, Span, SpecError, sort_problems
 from language.text.document import Document, ScalarNode
+from language.text.project_files import display_path
 from sweep.definition.study_reader import read_study
 
 
@@ -137,7 +138,15 @@ def merge_problems(results: Iterable[CheckResult]) -> list[Problem]:
 
 def spec_files(root: PathText) -> Iterator[Path]:
     """Yield the files `*.yaml` below `spec/` of a project, at any depth, sorted by path."""
-    yield from sorted((to_path(root, "root") / "spec").rglob("*.yaml"))
+    yield from sorted((to_project(root).root / "spec").rglob("*.yaml"))
+
+
+def no_spec_error(folder: Path) -> SpecError:
+    """Return the error about a folder of specs that has no spec or does not exist."""
+    reason = "" if folder.is_dir() else ": the folder does not exist"
+    label = f"there is no spec below {display_path(folder)}{reason}"
+    place = Span(Source(display_path(folder)), 1, 1)
+    return SpecError([Problem("missing", place, label, f"searched: {folder.absolute()}")])
 
 
 def problem_json(problem: Problem) -> dict[str, Any]:

@@ -8,18 +8,22 @@ from codegen.emit.c_module import emit_c_files
 from language.loading.load import automaton_of, program_of
 from language.overlays.expand_document import expand_document, read_document
 from language.text.arguments import PathText, to_path, to_project
-from modewright.api.spec_check import spec_files
+from modewright.api.spec_check import no_spec_error, spec_files
 
 
 def generated_files(root: PathText, out: PathText) -> dict[Path, bytes]:
     """Return the bytes of each file that belongs below the folder `out`, by path.
 
     The C of each automaton in `spec/<folder>/` of the project `root` belongs in `out/<folder>/`;
-    other kinds of specs are skipped. Writes no file. Raises SpecError.
+    other kinds of specs are skipped. Writes no file. Raises SpecError, also if the project has no
+    spec.
     """
     project, out_folder = to_project(root), to_path(out, "out")
     files: dict[Path, bytes] = {}
-    for path in spec_files(project.root):
+    paths = list(spec_files(project.root))
+    if not paths:
+        raise no_spec_error(project.root / "spec")
+    for path in paths:
         document = read_document(path)
         if expand_document(document, project).kind != "automaton":
             continue

@@ -48,6 +48,7 @@ from modewright.cli.commands.test import test
 from modewright.cli.commands.trace import trace
 from modewright.cli.common.console import configure
 from modewright.cli.common.exit_codes import EXIT_CODES, INTERRUPTED, run_with_exit_code
+from modewright.cli.common.interruption import convert_signals
 from modewright.runtime.gc_threshold import raise_gc_threshold
 from modewright.runtime.output_files import require_writable
 
@@ -146,8 +147,9 @@ app = build_application()
 def main() -> None:
     """Run the command line on `sys.argv` and exit with its exit code.
 
-    Missing stdout and stderr are replaced by the null device. After an interrupt further ones are
-    ignored during the exit.
+    Missing stdout and stderr are replaced by the null device. SIGTERM and SIGHUP interrupt the
+    command like Ctrl-C, with the exit code 128 plus their number. After an interrupt further ones
+    are ignored during the exit.
     """
     raise_gc_threshold()
     logging.raiseExceptions = False  # do not stop if the log cannot be written
@@ -160,7 +162,8 @@ def main() -> None:
     arguments = expand_arguments(sys.argv[1:])
     is_completion = COMPLETION_VARIABLE in os.environ
     run = build_application(None if is_completion else arguments)
-    code = run_with_exit_code(lambda: run(arguments, standalone_mode=False))
+    with convert_signals() as received:
+        code = run_with_exit_code(lambda: run(arguments, standalone_mode=False))
     if code == INTERRUPTED:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # ignore further interrupts during exit
-    sys.exit(code)
+    sys.exit(received.exit_code or code)

@@ -18,6 +18,8 @@ from modewright.editing.tokenised_text import (
 
 INDENTATION = 2
 """Blanks for each level of blocks."""
+VALUE_ENDS = (*CLOSING, yaml.FlowEntryToken)
+"""Tokens at the end of a value inside brackets."""
 COMMENT_GAP = 2
 """Smallest number of blanks between a value and a comment behind it."""
 
@@ -93,8 +95,8 @@ def space_tokens(text: str) -> str:
     """Return a text with normalised blanks inside brackets and after the dashes of lists.
 
     There is no blank inside brackets at both ends and before a comma or colon, and one after a
-    comma, a dash, and a colon in brackets. Several blanks after a comma are preserved if the item
-    starts in the same column as a token of the line above or below.
+    comma, a dash, and a colon in brackets, also if no value follows. Several blanks after a comma
+    are preserved if the item starts in the same column as a token of the line above or below.
     """
     tokenised = tokenise(text)
     lines = list(tokenised.lines)
@@ -114,7 +116,13 @@ def space_tokens(text: str) -> str:
 
 
 def _separator_of(left: Token, right: Token) -> str | None:
-    """Return the blanks between two tokens of a line; None to leave them."""
+    """Return the blanks between two tokens of a line; None to leave them.
+
+    A blank stays behind the colon of a key without a value, as in `{a: , b: }`, because `a:,` is no
+    key in YAML.
+    """
+    if left.kind is yaml.ValueToken and right.kind in VALUE_ENDS:
+        return " "
     if left.kind in OPENING or right.kind in CLOSING:
         return ""
     if right.kind in (yaml.FlowEntryToken, yaml.ValueToken):

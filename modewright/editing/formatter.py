@@ -8,7 +8,9 @@ before it.
 
 from __future__ import annotations
 
-from language.text.diagnostic import Source
+import yaml
+
+from language.text.diagnostic import Source, SpecError
 from language.text.document import MappingNode, ScalarNode, SequenceNode, YamlNode, lines_of
 from language.text.yaml_parser import parse_yaml
 from modewright.editing.format_passes import align_values, indent_blocks, space_tokens, strip_blanks
@@ -20,15 +22,17 @@ MAX_ROUNDS = 8
 """Largest number of rounds; a pass may undo the alignment of another one."""
 BYTE_ORDER_MARK = "\ufeff"
 """The byte order mark that some editors write at the start of a file."""
+Content = tuple[object, list[str]]
+"""The content of a text as plain data, and its comments."""
 
 
 def format_text(text: str, name: str = "") -> str:
     """Return the formatted text of a spec, with the layout that the module describes.
 
     Passes are repeated up to MAX_ROUNDS times; a pass that would change keys, values, quotes or
-    comments is skipped. A byte order mark is preserved; all line ends become those of the first
-    line. `name` is the name of the file in problems. Raises SpecError if the text is no valid YAML
-    of the language.
+    comments, or give invalid YAML, is skipped. A byte order mark is preserved; all line ends become
+    those of the first line. `name` is the name of the file in problems. Raises SpecError if the
+    text is no valid YAML of the language.
     """
     result = _run_passes(text.removeprefix(BYTE_ORDER_MARK).replace("\r\n", "\n"), name)
     if text.partition("\n")[0].endswith("\r"):
@@ -43,14 +47,22 @@ def _run_passes(text: str, name: str) -> str:
         before = text
         for run_pass in PASSES:
             candidate = run_pass(text)
-            if candidate != text and _content_of(candidate, name) == content:
+            if candidate != text and _has_content(candidate, name, content):
                 text = candidate
         if text == before:
             break
     return text
 
 
-def _content_of(text: str, name: str) -> tuple[object, list[str]]:
+def _has_content(text: str, name: str, content: Content) -> bool:
+    """Return whether a text is valid YAML with a content."""
+    try:
+        return _content_of(text, name) == content
+    except (SpecError, yaml.YAMLError):
+        return False
+
+
+def _content_of(text: str, name: str) -> Content:
     """Return the content of a text (keys, values, quotes) and its comments."""
     root = parse_yaml(Source(name, lines_of(text)), text)
     tokenised = tokenise(text)

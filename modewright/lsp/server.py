@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import logging
 from importlib.metadata import version
+from typing import Any, BinaryIO
 
 from lsprotocol import types
-from pygls.exceptions import JsonRpcInvalidParams
+from pygls.exceptions import JsonRpcException, JsonRpcInvalidParams
 from pygls.lsp.server import LanguageServer
 
 from language.text.diagnostic import SpecError
 from modewright.editing.formatter import format_text
 from modewright.lsp.completion import complete
 from modewright.lsp.hover import hover, reference_at
+from modewright.lsp.message_check import CheckedProtocol, parse_error, strict_converter
 from modewright.lsp.open_documents import OpenDocuments
 from modewright.lsp.outline import outline
 from modewright.lsp.positions import range_of
@@ -22,16 +25,58 @@ from modewright.lsp.rename_check import RenameRefused
 
 TRIGGER_CHARACTERS = [" ", ".", "{", ",", "("]
 """Characters after which an editor requests completions."""
+REFUSALS = (JsonRpcInvalidParams, json.JSONDecodeError, UnicodeDecodeError)
+"""Exceptions that the editor gets as an answer."""
+MALFORMED = "Unable to deserialize message"
+"""Start of the log of pygls about a malformed response, which is ignored."""
 
 
-def create_server() -> LanguageServer:
+class SpecServer(LanguageServer):
+    """The language server; it answers malformed messages, and its end waits for no thread."""
+
+    protocol: CheckedProtocol
+
+    def __init__(self) -> None:
+        super().__init__(
+            "modewright",
+            version("modewright"),
+            protocol_cls=CheckedProtocol,
+            converter_factory=strict_converter,
+        )
+
+    def report_server_error(self, error: Exception, source: Any) -> None:
+        """Answer a message that is no JSON; show other errors in the editor."""
+        if source is JsonRpcException and isinstance(error, ValueError):
+            self.protocol.refuse_message(None, parse_error(error))
+        else:
+            super().report_server_error(error, source)
+
+    def shutdown(self) -> None:
+        """Stop the server without waiting for the thread that reads messages."""
+        if self._stop_event is not None:
+            self._stop_event.set()
+        self.thread_pool.shutdown(wait=False, cancel_futures=True)
+
+
+def serve(requests: BinaryIO, responses: BinaryIO) -> int:
+    """Run the language server until `exit`, the end of the requests, or an interrupt.
+
+    Returns the exit code: 0 after the request `shutdown`, else 1.
+    """
+    server = create_server()
+    server.start_io(requests, responses)
+    return 0 if server.protocol.is_shut_down else 1
+
+
+def create_server() -> SpecServer:
     """Return a language server, not yet started and without open documents.
 
     Its features are diagnostics, hover, completion, quick fixes, formatting, definition,
-    references, outline and rename. Refused requests are no longer logged as errors.
+    references, outline and rename. Refused messages are no longer logged as errors.
     """
-    logging.getLogger("pygls.protocol.json_rpc").addFilter(_is_unexpected)
-    server = LanguageServer("modewright", version("modewright"))
+    for name in ("pygls.protocol.json_rpc", "pygls.server"):
+        logging.getLogger(name).addFilter(_is_unexpected)
+    server = SpecServer()
 
     def publish(uri: str, number: int | None, found: list[types.Diagnostic]) -> None:
         params = types.PublishDiagnosticsParams(uri, found, number)
@@ -45,9 +90,10 @@ def create_server() -> LanguageServer:
 
 
 def _is_unexpected(record: logging.LogRecord) -> bool:
-    """Return whether a log record is more than a refused request."""
+    """Return whether a log record is more than a refused message."""
     kind = record.exc_info[0] if record.exc_info else None
-    return kind is None or not issubclass(kind, JsonRpcInvalidParams)
+    is_refusal = kind is not None and issubclass(kind, REFUSALS)
+    return not is_refusal and not str(record.msg).startswith(MALFORMED)
 
 
 def _register_synchronisation(server: LanguageServer, open_documents: OpenDocuments) -> None:

@@ -8,6 +8,8 @@ import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from language.text.temporary_files import postpone_signals
+
 DEFAULT_FILE_MODE = 0o644
 """Mode of new files."""
 SPEC_SUFFIXES = (".yaml", ".yml")
@@ -114,17 +116,27 @@ def write_files(files: Mapping[Path, bytes]) -> None:
     """Write all files atomically: none is replaced before all are written beside their targets.
 
     Existing files keep their mode, new ones have DEFAULT_FILE_MODE; for a link its target is
-    replaced. Pipes and character devices are written last. Raises OutputError; then no temporary
-    file is left over.
+    replaced. A Ctrl-C or SIGTERM meanwhile takes effect when all files are replaced. Pipes and
+    character devices are written last. Raises OutputError; then no temporary file is left over.
     """
+    streams = {path: data for path, data in files.items() if _is_stream(path)}
+    with postpone_signals():
+        _replace_files({path: data for path, data in files.items() if path not in streams})
+    for path, data in streams.items():
+        try:
+            with path.open("wb") as stream:
+                stream.write(data)
+        except OSError as error:
+            raise OutputError(f"{path}: {error.strerror}") from None
+
+
+def _replace_files(files: Mapping[Path, bytes]) -> None:
+    """Write files beside their targets, then replace the targets in order. Raises OutputError."""
     temporary_files: list[tuple[str, Path]] = []
     current = Path()
-    streams = {path: data for path, data in files.items() if _is_stream(path)}
     try:
         for path, data in files.items():
             current = path
-            if path in streams:
-                continue
             target = _resolve_link(path)
             handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
             temporary_files.append((name, target))
@@ -137,9 +149,6 @@ def write_files(files: Mapping[Path, bytes]) -> None:
             name, current = temporary_files[0]
             os.replace(name, current)
             temporary_files.pop(0)
-        for current, data in streams.items():
-            with current.open("wb") as stream:
-                stream.write(data)
     except OSError as error:
         raise OutputError(f"{current}: {error.strerror}") from None
     finally:

@@ -40,34 +40,48 @@ CURVES: Mapping[str, Sequence[int]] = {
     "workers": (1, 2, 4),
 }
 ABOUT = {
-    "states": "The automaton is a chain of inertias with two states each and three modes. *Read "
-    "and checked* is the time for reading, checking and lowering the spec. *Compiled* is the time "
-    "of the C compiler. *Run again* is the time of a simulation of one second with a major step of "
-    "1 ms, including the lowering.",
-    "modes": "The automaton has four states, and its modes form a ring. The columns have the same "
-    "meaning as in the table of states.",
-    "seconds": "The driveline and its estimator with a period of 1 ms run in compiled C. The run "
-    "records a row every 10 ms.",
-    "variants": "One call computes variants of the tip-out on one core. The variants differ in "
-    "five parameters, and the major step is 5 ms.",
-    "workers": "A study computes 20 000 variants of the driveline with its estimator in a new "
-    "folder. The table gives elapsed times.",
+    "states": "The automaton is a chain of inertias that are connected by springs. It has two "
+    "states for each inertia, and three modes. The column *read and checked* contains the time in "
+    "which modewright reads, checks and lowers the spec. *Lowering* is the translation of the "
+    "checked spec to the internal program from which the C is printed. The column *compiled* "
+    "contains the time of the C compiler. The column *run again* contains the time of a "
+    "simulation for which the compiled C already exists. This time includes the lowering. The "
+    "simulation covers one second, and its major step is 1 ms.",
+    "modes": "The automaton has four states. Its modes form a ring: each mode has one transition, "
+    "which leads to the next mode. The columns have the same meaning as in the table above.",
+    "seconds": "The table gives the processor time of one simulation. The driveline and its "
+    "estimator are simulated by compiled C. The estimator has a period of 1 ms, and the "
+    "simulation records a row of results every 10 ms. The first column contains the simulated "
+    "time.",
+    "variants": "One call simulates many variants of the manoeuvre tip-out (a step of the motor "
+    "torque from positive to negative) on one core. The variants differ in the values of five "
+    "parameters. The major step is 5 ms. The column *carried out* contains the processor time of "
+    "the call.",
+    "workers": "A [study](studies.md) simulates 20 000 variants of the driveline with its "
+    "estimator. Worker processes share the variants. The column *study* contains the elapsed time "
+    "of the whole study.",
 }
 WHY = {
-    "states": "The stability limit of the step needs the eigenvalues of each mode. They are "
-    "computed in the arithmetic of the language, so that every machine computes the same bits. The "
-    "cost of the eigenvalues is cubic in the number of states. At 64 states it is half of the time "
-    "of *run again*. The compiled C has one line per operation.",
-    "modes": "Each mode has its own equations and its own step. No work depends on pairs of modes. "
-    "Below ten modes the start of the compiler takes most of the time.",
-    "seconds": "Lowering and printing take a tenth of a second. The memory holds the recorded rows "
-    "and the plan of the run, which lists instants and their actions.",
-    "variants": "The time is linear from one hundred variants on. The memory holds the results of "
-    "the call. [Studies](studies.md) compute their variants in blocks, so that their memory is "
-    "constant.",
-    "workers": "Before its first block each worker starts Python and loads the study and the "
-    "compiled library. This takes more than a second of processor time per worker. With more "
-    "workers than cores the study takes longer.",
+    "states": "The largest stable step of the integration follows from the eigenvalues of each "
+    "mode. Modewright computes these eigenvalues with scalar operations in a fixed order and not "
+    "with a library of linear algebra, so that the result has the same bits on every machine. The "
+    "cost of the eigenvalues is cubic in the number of states. At 64 states they take half of the "
+    "time of *run again*. The C has one line for each operation, so the time of *compiled* also "
+    "grows with the number of states.",
+    "modes": "Each mode has its own equations and its own integration step in the C. No part of "
+    "the computation examines every pair of modes. Therefore no time grows with the square of the "
+    "number of modes. Below ten modes the start of the compiler takes most of the time of "
+    "*compiled*.",
+    "seconds": "In each row, lowering the spec and printing the C take about 0.1 s. The memory "
+    "contains the recorded rows and the plan of the simulation. The plan lists all instants with "
+    "their actions, such as the ticks of the estimator.",
+    "variants": "From 1,000 variants on, the time is nearly proportional to the number of "
+    "variants. The memory contains the results of all variants of the call. A [study](studies.md) "
+    "computes its variants in blocks and writes each block to a file. Its memory therefore does "
+    "not depend on the number of variants.",
+    "workers": "Before its first block of variants, each worker starts Python and loads the study "
+    "and the compiled C. This takes more than a second of processor time for each worker. With "
+    "more workers than cores the study therefore takes longer.",
 }
 """Reasons for the measured exponents, found with a profiler; check them with new figures."""
 STUDY_VARIANTS = 20_000
@@ -235,9 +249,11 @@ def page(found: Mapping[str, Sequence[Point]]) -> str:
     lines = [
         "# Scaling",
         "",
-        'The command `make bench ARGS="--growth"` measures the figures on this page. Each row of a '
-        "table is measured in a process of its own. The times are processor times, except in the "
-        "table of workers.",
+        "This page shows how time and memory grow with the size of a spec, of a simulation and of "
+        "a study. [The glossary](glossary.md) explains the terms.",
+        'The command `make bench ARGS="--growth"` measures the figures. It measures each row of a '
+        "table in a separate process. The times are processor times, except in the table of "
+        "workers. The column *memory* contains the largest memory of the process of the row.",
         f"The machine has {os.cpu_count()} cores. Other load on the machine changes the figures.",
         "",
         "![Time and memory over the size](growth.png)",
@@ -250,11 +266,11 @@ def page(found: Mapping[str, Sequence[Point]]) -> str:
         for one in points:
             cells = [f"{one.size:,}", *(f"{one.seconds[part]:.3g}" for part in parts)]
             lines += ["| " + " | ".join([*cells, f"{one.megabytes:.0f}"]) + " |"]
-        powers = [f"{exponent(points, part):.1f} (*{part}*)" for part in parts]
+        powers = [f"{exponent(points, part):.1f} for *{part}*" for part in parts]
         lines += [
             "",
-            f"Between the last two rows the time grows with the number of {name} to the power of "
-            f"{', '.join(powers)}. {WHY[name]}",
+            "Between the last two rows, each time grows in proportion to a power of the number "
+            f"of {name}. The exponent of this power is {', '.join(powers)}. {WHY[name]}",
         ]
     return "\n".join(lines) + "\n"
 

@@ -163,6 +163,35 @@ def test_an_editable_installation_has_the_packages_where_they_lie(
     assert archive.read(paths[0]).decode().split() == [str(source)]
 
 
+NOT_INSTALLED = "modewright needs to be installed; it cannot run from a zip archive"
+
+
+@pytest.mark.parametrize("name", ["wheel", "archive.zip"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["-m", "modewright", "check", "estimator"],
+        ["-m", "modewright.cli.app"],
+        ["-m", "modewright.lsp.background_check"],
+        ["-c", "import modewright"],
+        ["-c", "from modewright import simulate"],
+    ],
+    ids=" ".join,
+)
+def test_a_zip_archive_on_the_path_is_refused_in_one_line(
+    wheel: Path, tmp_path: Path, name: str, command: list[str]
+) -> None:
+    archive = wheel if name == "wheel" else shutil.copy(wheel, tmp_path / name)
+    environ = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
+    environ["PYTHONPATH"] = os.pathsep.join((str(archive), sysconfig.get_path("purelib")))
+    words = [sys.executable, "-S", *command]
+    done = subprocess.run(words, cwd=tmp_path, env=environ, capture_output=True, text=True)
+    assert done.returncode == 1 and done.stdout == ""
+    *trace, last = done.stderr.splitlines()
+    assert NOT_INSTALLED in last
+    assert not trace or command[0] == "-c"  # an import in a script shows its place
+
+
 def test_no_module_of_the_wheel_imports_a_top_level_package_of_ours(wheel: Path) -> None:
     archive, seen = zipfile.ZipFile(wheel), set()
     for name in content(wheel):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import platform
-import tempfile
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from codegen.toolchain.compiler import (
 )
 from codegen.toolchain.object_cache import substitute_objects
 from language.ir.program import Program
+from language.text.temporary_files import temporary_folder
 
 SHARED_LIBRARY_FLAGS = ("-shared", "-fPIC", "-fvisibility=hidden", "-s")
 """Flags of a shared library that exports only the functions of the standard. It has no symbols, so
@@ -65,19 +65,18 @@ def build_binary(files: Mapping[str, bytes], headers: Mapping[str, bytes]) -> by
     (those of the standard) is a system header, for which the compiler gives no warnings. Raises
     MissingToolError, BuildError.
     """
-    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
-        ours, standard = Path(name) / "sources", Path(name) / "standard"
+    with temporary_folder() as folder:
+        ours, standard, target = (folder / name for name in ("sources", "standard", "library"))
         ours.mkdir()
         standard.mkdir()
         for path, data in files.items():
-            folder = standard if Path(path).name in headers else ours
-            (folder / Path(path).name).write_bytes(data)
+            place = standard if Path(path).name in headers else ours
+            (place / Path(path).name).write_bytes(data)
         compile_command = [*find_compiler(), *FLAGS, *WARNINGS, *SHARED_LIBRARY_FLAGS]
-        object_folder = Path(name) / "objects"
+        object_folder = folder / "objects"
         parts = substitute_objects(
             sorted(ours.glob("*.c")), compile_command, compiler_version(), object_folder
         )
-        target = Path(name) / "library"
         run_compiler([*compile_command, "-isystem", str(standard), *map(str, parts), "-lm"], target)
         return target.read_bytes()
 

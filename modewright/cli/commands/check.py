@@ -69,11 +69,14 @@ def _check_specs(
 ) -> bool:
     """Check specs, report their problems and return whether there are no errors.
 
-    Without errors the step limits of the first `named` specs are printed, too.
+    No spec at all is an error. Without errors the step limits of the first `named` specs are
+    printed, too.
     """
     from modewright.api import spec_check as checking
 
     found = [checking.check_spec(name) for name in names]
+    if not names:
+        found = [checking.CheckResult(tuple(checking.no_spec_error(Path("spec")).problems))]
     problems = checking.merge_problems(found)
     if sarif:
         _write_sarif(sarif, problems, as_json)

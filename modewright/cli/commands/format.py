@@ -60,5 +60,13 @@ def _write_note(path: Path) -> str:
 
 
 def _find_specs(path: Path) -> list[Path]:
-    """Return the YAML files below a folder in order, or the file itself."""
-    return sorted(path.rglob("*.yaml")) if path.is_dir() else [path]
+    """Return the YAML files below a folder in order, or the file itself.
+
+    Raises SpecError for a folder without YAML files.
+    """
+    found = sorted(path.rglob("*.yaml")) if path.is_dir() else [path]
+    if not found:
+        from modewright.api.spec_check import no_spec_error
+
+        raise no_spec_error(path)
+    return found

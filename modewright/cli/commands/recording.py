@@ -50,12 +50,13 @@ def check(
     from modewright.api.recordings import check_recordings
     from modewright.render import recording as show_recording, run as show
 
+    form = picture_format(plot) if plot else ""
     require_writable(plot)
     with progress_spinner(f"looking at {pluralise(len(files), 'recording')}"), usage_errors():
         checked = check_recordings(files, mapping, spec, databases or ())
     if plot:
         title = ", ".join(file.name for file in files) + (f" against {spec}" if spec else "")
-        write_files({plot: checked.plot(title).data(picture_format(plot))})
+        write_files({plot: checked.plot(title).data(form)})
     if as_json:
         show.print_json(show_recording.check_json(checked.check))
     else:

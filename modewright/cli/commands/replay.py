@@ -45,6 +45,7 @@ def replay(
     from modewright.render import run as show
 
     require_run_format(out)
+    form = picture_format(plot) if plot else ""
     require_writable(out, plot)
     with progress_spinner(f"replaying {recording.name}"):
         replayed = api.replay(
@@ -58,7 +59,7 @@ def replay(
         from modewright.render.replay_figure import replay_picture
 
         title = f"{estimator} on {recording.name}" + (f", variant {variant}" if variant else "")
-        files[plot] = replay_picture(replayed, title, picture_format(plot))
+        files[plot] = replay_picture(replayed, title, form)
     write_files(files)
     if as_json:
         show.print_json(show.replay_json(replayed))

@@ -61,6 +61,7 @@ def simulate(
 
     _require_one_integration(reference, method, compiled)
     require_run_format(out)
+    form = picture_format(plot) if plot else ""
     require_writable(out, plot)
     with progress_spinner(f"simulating {system}, {scenario}"), usage_errors():
         trajectory = api.simulate(
@@ -74,7 +75,7 @@ def simulate(
         )
     files = encode_run(trajectory, out) if out else {}
     if plot:
-        files[plot] = _draw_plot(trajectory, f"{system}, scenario {scenario}", plot)
+        files[plot] = _draw_plot(trajectory, f"{system}, scenario {scenario}", form)
     write_files(files)
     _report_run(trajectory, list(files), as_json)
 
@@ -107,8 +108,8 @@ def _report_run(trajectory: Trajectory, files: list[Path], as_json: bool) -> Non
         report_written_files(files)
 
 
-def _draw_plot(trajectory: Trajectory, title: str, plot: Path) -> bytes:
-    """Return the figure of a run in the format of the path."""
+def _draw_plot(trajectory: Trajectory, title: str, form: str) -> bytes:
+    """Return the figure of a run in a format."""
     from engine.results.plot import draw_overview
 
-    return draw_overview([trajectory], title=title).data(picture_format(plot))
+    return draw_overview([trajectory], title=title).data(form)

@@ -17,9 +17,6 @@ from modewright.runtime.output_files import OutputError, require_calibration_out
 if TYPE_CHECKING:
     from engine.results.trajectory import Trajectory
 
-GRAPHIC_FORMATS = (".png", ".svg", ".pdf")
-"""Suffixes of figures."""
-
 System = Annotated[str, typer.Argument(help="a system or automaton: name or file")]
 Scenario = Annotated[str, typer.Option("--scenario", "-s", help="a scenario: name or file")]
 Sets = Annotated[
@@ -121,9 +118,12 @@ def picture_format(path: Path) -> str:
 
     Raises OutputError for other suffixes.
     """
-    if path.suffix.lower() not in GRAPHIC_FORMATS:
-        raise OutputError(f"{path}: a picture ends with {', '.join(GRAPHIC_FORMATS)}")
-    return path.suffix.lower()[1:]
+    from engine.results import picture_format as formats
+
+    try:
+        return formats.picture_format(path)
+    except ValueError as error:
+        raise OutputError(str(error)) from None
 
 
 def report_run_end(failed: bool, trajectory: Trajectory) -> None:

@@ -7,7 +7,6 @@ import io
 import os
 import subprocess
 import tarfile
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,6 +19,7 @@ from language.text.document import Document, Entry, MappingNode, ScalarNode, Seq
 from language.text.node_edit import put_node
 from language.text.overlay import apply_overlay
 from language.text.project_files import Project
+from language.text.temporary_files import temporary_folder
 
 
 @contextmanager
@@ -31,11 +31,8 @@ def load_documents(*references: str) -> Iterator[list[Document]]:
     revision. Files of a revision are in a temporary folder until the context ends. Raises
     SpecError, also if Git does not know the revision, and MissingToolError if Git is not installed.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        yield [
-            _load_document(reference, Path(folder) / str(k))
-            for k, reference in enumerate(references)
-        ]
+    with temporary_folder() as folder:
+        yield [_load_document(reference, folder / str(k)) for k, reference in enumerate(references)]
 
 
 def _load_document(reference: str, folder: Path) -> Document:

@@ -29,7 +29,7 @@ OTHER_FUNCTIONS = (
     traceability.trace_keys,
 )
 """Functions behind commands that `modewright` itself does not offer."""
-UNCHECKED_PARAMETERS = {"credentials", "executor", "problems", "progress", "tell", "title", "warn"}
+UNCHECKED_PARAMETERS = {"credentials", "executor", "problems", "progress", "tell", "warn"}
 """Functions and objects of the library: they are no names, paths, numbers or choices."""
 VALID = {"stage": "model", "values": {}}
 """Arguments that are needed and are no name."""
@@ -118,7 +118,15 @@ def test_a_single_text_is_one_item(run: mw.Trajectory, tmp_path: Path) -> None:
         (lambda run: list(mw.prove("thermostat", checks="nope")), "misra"),
         (lambda run: mw.import_calibration("x.dcm", "thermostat", form="xls"), "dcm, cdfx, csv"),
         (lambda run: mw.export_calibration("thermostat").text("xls"), "dcm, cdfx, csv"),
-        (lambda run: run.plot().save("x.bmp"), r"pdf.* png.* svg.*, not 'bmp'"),
+        (lambda run: run.plot().save("x.bmp"), r"`path` is x.bmp: a picture ends with \.png"),
+        (lambda run: run.plot().save("x.gif"), r"`path` is x.gif: a picture ends with \.png"),
+        (lambda run: run.plot().save("x"), r"`path` is x: a picture ends with \.png, \.svg, \.pdf"),
+        (lambda run: run.plot().data("gif"), r"`form` is one of png, svg, pdf, not 'gif'"),
+        (lambda run: mw.read("run.csv.json"), r"side file of a run: name the run, run\.csv"),
+        (lambda run: mw.check("room", root="nope"), "`root` is an existing folder, not nope"),
+        (lambda run: mw.check("room", root="x" * 5000), r"not x+\.\.\.: there is none"),
+        (lambda run: mw.check("room", root="a\0b"), "`root` is a path, .*: it has a NUL character"),
+        (lambda run: mw.check("room", root="README.md"), "not README.md: this is no folder"),
         (lambda run: run.events_of("nope"), "room, thermostat"),
         (lambda run: run.events_of("thermostatt"), "did you mean `thermostat`"),
         (lambda run: mw.check_recordings([]), "`files` is empty"),
@@ -146,6 +154,12 @@ def test_a_wrong_choice_names_the_choices(
 ) -> None:
     with pytest.raises(ValueError, match=named):
         call(run)
+
+
+@pytest.mark.parametrize("title", [float("nan"), 5, b"x"])
+def test_a_title_is_a_text(run: mw.Trajectory, title: object) -> None:
+    with pytest.raises(TypeError, match="`title` is a text, not"):
+        mw.plot(run, title=title)  # type: ignore[arg-type]
 
 
 def test_an_instance_without_events_has_none(run: mw.Trajectory) -> None:

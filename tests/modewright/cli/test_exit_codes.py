@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -99,6 +100,50 @@ def test_an_output_that_cannot_be_written_is_1_before_any_work(tmp_path: Path) -
     assert run("simulate", "ev_driveline", "-s", "tip_out", "--out", str(out)) == 1
     assert run("simulate", "ev_driveline", "-s", "tip_out", "--out", str(tmp_path)) == 1
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("check", "--all"),
+        ("check", "--all", "--json"),
+        ("generate", "--all"),
+        ("generate", "--all", "--check"),
+        ("format", "."),
+        ("test",),
+    ],
+)
+def test_a_folder_without_specs_is_1(
+    arguments: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(*arguments) == 1
+    assert re.search("there is no (spec|test) below", "".join(capsys.readouterr()))
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("simulate", "ev_driveline", "-s", "tip_out", "--plot", "a.gif"),
+        ("replay", "estimator", str(TRACE), "--map", "reference_trace", "--plot", "a.gif"),
+        ("recording", "check", str(TRACE), "--plot", "a.gif"),
+        ("plot", "ev_driveline:tip_out", "--out", "a.gif"),
+    ],
+)
+def test_a_picture_of_another_format_is_1_before_any_work(
+    arguments: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("CC", "no-such-compiler")
+    assert run(*arguments) == 1
+    assert "a.gif: a picture ends with .png, .svg, .pdf" in capsys.readouterr().err
 
 
 def test_problems_are_json_on_request(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

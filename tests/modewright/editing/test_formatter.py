@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from language.overlays.expand_document import parse_document
 from language.text.diagnostic import SpecError
 from language.text.project_files import source_of
+from language.text.yaml_parser import parse_yaml
 from modewright.cli.app import app
 from modewright.editing.formatter import format_text
 from modewright.editing.tokenised_text import tokenise
@@ -72,6 +73,79 @@ def shaken(text: str, chance: random.Random) -> str:
         lines.append(" " * (depth * width) + content + " " * chance.randint(0, 3) + sign + comment)
         lines += [""] * chance.choice((0, 0, 0, 2))
     return "\n".join(lines)
+
+
+EMPTY_VALUES = {
+    "a: {about:   , unit: s}": "a: {about: , unit: s}",
+    "a: {unit: s,about: }": "a: {unit: s, about: }",
+    "a: { about: ,unit: }  # c": "a: {about: , unit: }  # c",
+    'a: {"about" :   }': 'a: {"about": }',
+    "a: [b: , {c: }]": "a: [b: , {c: }]",
+    "a: {b , c}": "a: {b, c}",
+    "about:   # c\nunit:   s": "about:   # c\nunit: s",
+    "about: \n  # c\nb:\n      c:\n      d: 1": "about:\n  # c\nb:\n  c:\n  d: 1",
+    "a:\n -\n -   b:\n -  # c": "a:\n  -\n  - b:\n  -  # c",
+    "a: {b:\n, c: 1}": "a: {b:\n, c: 1}",
+}
+"""Texts with keys without value, and how they are formatted."""
+
+
+@pytest.mark.parametrize("text", EMPTY_VALUES)
+def test_a_key_without_value_stays_valid(text: str) -> None:
+    assert format_text(text) == EMPTY_VALUES[text] + "\n"
+    assert_same_content(text)
+
+
+@pytest.mark.parametrize("seed", range(300))
+def test_a_random_mapping_with_empty_values_keeps_its_content(seed: int) -> None:
+    assert_same_content("\n".join(random_block(random.Random(seed), 0)))
+
+
+def assert_same_content(text: str) -> None:
+    """Assert that a formatted text has the content of the text and is not changed again."""
+    made = format_text(text)
+    before, after = (parse_yaml(source_of(HERE, each), each) for each in (text, made))
+    assert to_plain_data(after) == to_plain_data(before), (text, made)
+    assert _comments(made) == _comments(text)
+    assert format_text(made) == made, (text, made)
+
+
+def random_block(chance: random.Random, depth: int) -> list[str]:
+    """Return the lines of a block mapping with scalars, flow collections, blocks and no values."""
+    lines: list[str] = []
+    for key in random_keys(chance):
+        kinds = ("", "", "s", "''", '""', "|", "flow", "block" if depth < 2 else "")
+        value, blanks = chance.choice(kinds), " " * chance.choice((1, 1, 4))
+        note = chance.choice(("", "", "   # note", "  #"))
+        if value == "flow":
+            value = random_flow(chance, 0)
+        if value == "block":
+            indent = " " * chance.choice((1, 2, 4))
+            lines += [f"{key}:{note}", *(indent + line for line in random_block(chance, depth + 1))]
+        elif value == "|":
+            lines += [f"{key}: |", "     x  # no note", ""]
+        else:
+            lines += [f"{key}:{blanks}{value}{note}", *chance.choice(([], [], [""], ["# line"]))]
+    return lines
+
+
+def random_flow(chance: random.Random, depth: int) -> str:
+    """Return a flow mapping or a list of such with keys without values."""
+    parts = []
+    for key in random_keys(chance):
+        kinds = ("", "s", "''", "1 m/s", "[]", "{}", "deep")
+        value = chance.choice(kinds)
+        if value == "deep":
+            value = random_flow(chance, depth + 1) if depth < 2 else ""
+        colon = chance.choice((":", ":", ": ", " :   "))
+        parts.append(chance.choice((key, f"{key}{colon} {value}", f"{key}{colon} {value} ")))
+    comma = chance.choice((",", ", ", " , ", ",   "))
+    return chance.choice(("{%s}", "{ %s }", "[{%s}]", "[ {%s} , {a: } ]")) % comma.join(parts)
+
+
+def random_keys(chance: random.Random) -> list[str]:
+    """Return some keys, one of which is quoted."""
+    return chance.sample(("a", "about", "unit", '"q"', "'r'", "long_key"), chance.randint(1, 4))
 
 
 def _comments(text: str) -> list[str]:

@@ -7,9 +7,10 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import IO, Any
 
 LONGEST_SECONDS = 240.0
 """After which a server that says nothing more is ended."""
@@ -19,11 +20,14 @@ Message = dict[str, Any]
 class LspClient:
     """One running server; a context that shuts it down."""
 
-    def __init__(self, encodings: tuple[str, ...] = ("utf-16",)) -> None:
+    def __init__(
+        self, encodings: tuple[str, ...] = ("utf-16",), stderr: IO[bytes] | None = None
+    ) -> None:
         self.process = subprocess.Popen(
             [sys.executable, "-m", "modewright", "lsp"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
+            stderr=stderr,
         )
         self.watchdog = threading.Timer(LONGEST_SECONDS, self.process.kill)
         self.watchdog.daemon = True
@@ -50,9 +54,17 @@ class LspClient:
             self.request("shutdown", None)
             self.notify("exit", None)
             assert self.process.wait(10) == 0
+        self.close()
+
+    def close(self) -> None:
+        """End the process if it still runs."""
         self.watchdog.cancel()
         self.process.kill()
-        self.process.communicate()
+        self.process.wait()
+        for stream in (self.process.stdin, self.process.stdout):
+            with suppress(BrokenPipeError):
+                if stream:
+                    stream.close()
 
     def notify(self, method: str, params: Any) -> None:
         self._send({"jsonrpc": "2.0", "method": method, "params": params})

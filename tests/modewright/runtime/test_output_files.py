@@ -53,6 +53,15 @@ def test_a_killed_writer_leaves_no_half_of_a_file(tmp_path: Path, step: int) -> 
         assert path.read_bytes() == name.encode() * 100_000
 
 
+@pytest.mark.parametrize("step", range(7))
+def test_a_writer_that_is_asked_to_end_writes_all_files_first(tmp_path: Path, step: int) -> None:
+    ended = KILLED.replace("SIGKILL", "SIGTERM").replace("< 0", "== -1")
+    words = [sys.executable, "-c", ended, str(tmp_path), str(step)]
+    done = subprocess.run(words, check=False, timeout=60)
+    assert done.returncode == (0 if step == 6 else -15)
+    assert sorted(path.name for path in tmp_path.iterdir()) == list("abc")
+
+
 def test_one_that_cannot_be_written_leaves_none(tmp_path: Path) -> None:
     with pytest.raises(OutputError):
         write_files({tmp_path / "a": b"a", tmp_path / "no" / "b": b"b"})

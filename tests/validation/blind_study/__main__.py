@@ -16,6 +16,7 @@ from tests.validation.blind_study.cases import GENERATOR
 from tests.validation.blind_study.effect_catalogue import pairs_of
 from tests.validation.blind_study.label_digests import is_sealed, seals_of, write_seals
 from tests.validation.blind_study.negative_control import (
+    TIMES,
     baseline_alarm_rate,
     baseline_rate,
     majority_rate,
@@ -90,17 +91,26 @@ def _beside(every: Sequence[Answer], seed: int) -> list[str]:
         return []
     chance = permutation_score(full, random.Random(seed))
     lines = [
-        "If the labels are permuted at random, the first name is right in "
-        f"{chance:.1%} of the cases.",
-        "If every verdict is the most frequent label, this name is right in "
+        "The first control exchanges the labels of the cases at random. The first name then agrees "
+        f"with the label in {chance:.1%} of the cases (mean of {TIMES} permutations).",
+        "The second control names the most frequent effect in every case. This name is right in "
         f"{majority_rate(full).text} cases.",
-        "A recalibration of the base without effects names no effect.",
+        "The first simpler method fits the parameters of the base and does nothing else. "
+        "It therefore never names an effect.",
     ]
     for method, words in (
-        ("sindy", "Sparse regression of the residual of the recalibrated base (PySINDy)"),
-        ("free_gain", "The choice of the effect with the largest gain in free simulation"),
+        (
+            "sindy",
+            "The second simpler method is a sparse regression (PySINDy) of the residuals that the "
+            "balances of the recalibrated base leave.",
+        ),
+        (
+            "free_gain",
+            "The third simpler method chooses the effect that reduces the error of a simulation "
+            "without corrections by measurements most.",
+        ),
     ):
-        line = f"{words} names the right effect in {baseline_rate(full, method).text} cases."
+        line = f"{words} It names the right effect in {baseline_rate(full, method).text} cases."
         if clean:
             alarms = baseline_alarm_rate(clean, method).text
             line += f" It gives a false alarm in {alarms} cases without an effect."
@@ -114,8 +124,9 @@ def _compiled(some: Sequence[Answer]) -> str:
     kept = [one.cpu_s for one in some if one.plan == "full" and not _is_compiled(one)]
     usual = f" The median processor time of these cases is {median(kept):.1f} s." if kept else ""
     return (
-        f"The C compiler used {part:.0%} of the processor time. In {len(kept)} cases with an effect"
-        f" all models were in the cache.{usual}"
+        f"The diagnosis compiles models to C. The C compiler used {part:.0%} of the processor time "
+        f"of the groups `full` and `clean`. In {len(kept)} cases of the group `full` all compiled "
+        f"models were in the cache, because earlier cases had compiled them.{usual}"
     )
 
 
