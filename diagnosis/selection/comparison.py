@@ -63,12 +63,10 @@ def compare_candidates(
     model_set: ModelSet,
     base: Estimate,
     placed_effects: Iterable[PlacedEffect],
-    min_gain: float,
     log: LogCallback = lambda text: None,
 ) -> Round:
     """Return the comparison of effects beside a base.
 
-    Beside accepted effects no candidate is fitted if no free disturbance gains `min_gain` [nats].
     A base that is fitted by simulation without an observer has no free disturbance; there the noise
     of the signals is the floor.
     """
@@ -79,9 +77,6 @@ def compare_candidates(
     }
     flexible = min(free.values(), key=lambda one: one.cost, default=base)
     start = extend_vector(base.candidate, flexible.candidate, flexible.point, {})
-    gain = (base.cost - flexible.cost) / integrated_autocorrelation(flexible, model_set.series)
-    if base.candidate.placed_effects and not is_simulated and gain < min_gain:
-        placed_effects = ()
     found = search_candidates(model_set, base, placed_effects, start, log)
     fits = [one.estimate for one in found if one.estimate is not None]
     floor = least_variances([base, *free.values(), *fits])

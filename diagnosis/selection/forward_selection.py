@@ -79,21 +79,19 @@ def select_effects(
     what any disturbance explains. If it explains less, a second effect is tried beside it: both are
     accepted if they do so together.
     """
-    first = compare_candidates(
-        model_set, base, model_set.applicable_effects(), thresholds.default, log
-    )
+    first = compare_candidates(model_set, base, model_set.applicable_effects(), log)
     found = Selection(base, base, (), first, first)
     best = _best_candidate(first, thresholds)
     if best is None:
         return found
     if best.share < MIN_SHARE:
         return _select_pair(model_set, found, best, thresholds, log)
-    found = _accept(model_set, found, best, thresholds.default, log)
+    found = _accept(model_set, found, best, log)
     while len(found.accepted) < MAX_EFFECTS:
         best = _best_candidate(found.last, thresholds)
         if best is None or best.share < MIN_SHARE:
             break
-        found = _accept(model_set, found, best, thresholds.default, log)
+        found = _accept(model_set, found, best, log)
     return replace(found, rivals=_rivals(first, found.accepted[0]))
 
 
@@ -106,13 +104,13 @@ def _best_candidate(compared: Round, thresholds: Thresholds) -> CandidateFit | N
 
 
 def _accept(
-    model_set: ModelSet, found: Selection, best: CandidateFit, min_gain: float, log: LogCallback
+    model_set: ModelSet, found: Selection, best: CandidateFit, log: LogCallback
 ) -> Selection:
     """Return the selection with one effect more, and the comparison beside it."""
     assert best.estimate is not None
     log(f"accepted {best.placed_effect.id}: {best.gain:.0f} nats, {100 * best.share:.0f} %")
     model = best.estimate
-    last = compare_candidates(model_set, model, model_set.applicable_effects(), min_gain, log)
+    last = compare_candidates(model_set, model, model_set.applicable_effects(), log)
     accepted = (*found.accepted, best)
     share = 1.0 - remaining_energy(model, found.first.floor) / found.first.energy
     return replace(found, model=model, accepted=accepted, last=last, share=share)
@@ -126,10 +124,10 @@ def _select_pair(
     log: LogCallback,
 ) -> Selection:
     """Return the selection with two effects that together explain most; else without any."""
-    pair = _accept(model_set, found, best, thresholds.default, log)
+    pair = _accept(model_set, found, best, log)
     second = _best_candidate(pair.last, thresholds)
     if second is not None and second.share >= MIN_SHARE:
-        return _accept(model_set, pair, second, thresholds.default, log)
+        return _accept(model_set, pair, second, log)
     log(f"not accepted {best.placed_effect.id}: it explains {100 * best.share:.0f} %")
     return found
 
