@@ -44,6 +44,11 @@ def remaining_energy(model: Estimate, floor: Reals) -> float:
     return float(np.sum(model.prediction.variances / floor - 1.0))
 
 
+def is_ordinary(energy: float, channels: int) -> bool:
+    """Return whether a remaining energy may be that of an ordinary disturbance."""
+    return energy <= MAX_ORDINARY_ENERGY * channels
+
+
 def explained_share(model: Estimate, base: Estimate, floor: Reals) -> float:
     """Return the part of the remaining energy of `base` that `model` explains, 1 at most.
 

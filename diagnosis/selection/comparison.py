@@ -14,8 +14,8 @@ import numpy as np
 
 from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
 from diagnosis.criterion.explained_share import (
-    MAX_ORDINARY_ENERGY,
     explained_share,
+    is_ordinary,
     least_variances,
     remaining_energy,
 )
@@ -49,7 +49,7 @@ class Round:
     @property
     def is_ordinary(self) -> bool:
         """Whether what the base leaves may be an ordinary disturbance."""
-        return self.energy <= MAX_ORDINARY_ENERGY * len(self.floor)
+        return is_ordinary(self.energy, len(self.floor))
 
     @property
     def total_gain(self) -> float:
@@ -67,6 +67,8 @@ def compare_candidates(
 ) -> Round:
     """Return the comparison of effects beside a base.
 
+    Beside accepted effects no candidate is fitted if what they leave may be an ordinary
+    disturbance, which free disturbances show.
     A base that is fitted by simulation without an observer has no free disturbance; there the noise
     of the signals is the floor.
     """
@@ -77,6 +79,8 @@ def compare_candidates(
     }
     flexible = min(free.values(), key=lambda one: one.cost, default=base)
     start = extend_vector(base.candidate, flexible.candidate, flexible.point, {})
+    if base.candidate.placed_effects and free and _is_ordinary(base, free.values()):
+        placed_effects = ()
     found = search_candidates(model_set, base, placed_effects, start, log)
     fits = [one.estimate for one in found if one.estimate is not None]
     floor = least_variances([base, *free.values(), *fits])
@@ -98,6 +102,12 @@ def compare_candidates(
     judged.sort(key=lambda one: -one.gain)
     energy = remaining_energy(base, floor)
     return Round(base, free, tuple(judged), floor, energy, correlation)
+
+
+def _is_ordinary(base: Estimate, free: Iterable[Estimate]) -> bool:
+    """Return whether free disturbances explain no more than an ordinary one may leave."""
+    floor = least_variances([base, *free])
+    return is_ordinary(remaining_energy(base, floor), len(floor))
 
 
 def effective_gain(model: Estimate, base: Estimate, correlation: float, recordings: int) -> float:
