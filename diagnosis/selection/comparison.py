@@ -64,11 +64,11 @@ def compare_candidates(
     base: Estimate,
     placed_effects: Iterable[PlacedEffect],
     log: LogCallback = lambda text: None,
+    least_energy: float = 0.0,
 ) -> Round:
     """Return the comparison of effects beside a base.
 
-    Beside accepted effects no candidate is fitted if what they leave may be an ordinary
-    disturbance, which free disturbances show.
+    No candidate is fitted if free disturbances show that the base leaves less than `least_energy`.
     A base that is fitted by simulation without an observer has no free disturbance; there the noise
     of the signals is the floor.
     """
@@ -79,7 +79,8 @@ def compare_candidates(
     }
     flexible = min(free.values(), key=lambda one: one.cost, default=base)
     start = extend_vector(base.candidate, flexible.candidate, flexible.point, {})
-    if base.candidate.placed_effects and free and _is_ordinary(base, free.values()):
+    shown = remaining_energy(base, least_variances([base, *free.values()]))
+    if free and shown < least_energy:
         placed_effects = ()
     found = search_candidates(model_set, base, placed_effects, start, log)
     fits = [one.estimate for one in found if one.estimate is not None]
@@ -102,12 +103,6 @@ def compare_candidates(
     judged.sort(key=lambda one: -one.gain)
     energy = remaining_energy(base, floor)
     return Round(base, free, tuple(judged), floor, energy, correlation)
-
-
-def _is_ordinary(base: Estimate, free: Iterable[Estimate]) -> bool:
-    """Return whether free disturbances explain no more than an ordinary one may leave."""
-    floor = least_variances([base, *free])
-    return is_ordinary(remaining_energy(base, floor), len(floor))
 
 
 def effective_gain(model: Estimate, base: Estimate, correlation: float, recordings: int) -> float:

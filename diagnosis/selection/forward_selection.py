@@ -8,7 +8,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
-from diagnosis.criterion.explained_share import MIN_SHARE, log_form_weight, remaining_energy
+from diagnosis.criterion.explained_share import (
+    FORM_ERROR,
+    MAX_ORDINARY_ENERGY,
+    MIN_SHARE,
+    log_form_weight,
+    remaining_energy,
+)
 from diagnosis.criterion.threshold import DEFAULT_THRESHOLDS, Thresholds
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.model_set import ModelSet
@@ -95,6 +101,13 @@ def select_effects(
     return replace(found, rivals=_rivals(first, found.accepted[0]))
 
 
+def tolerated_energy(first: Round) -> float:
+    """Return the energy that accepted effects may leave: the error of their form, at most that of
+    an ordinary disturbance.
+    """
+    return min(FORM_ERROR**2 * first.energy, MAX_ORDINARY_ENERGY * len(first.floor))
+
+
 def _best_candidate(compared: Round, thresholds: Thresholds) -> CandidateFit | None:
     """Return the candidate with the largest gain, None if it does not gain its threshold."""
     best = next(iter(compared.candidates), None)
@@ -110,7 +123,9 @@ def _accept(
     assert best.estimate is not None
     log(f"accepted {best.placed_effect.id}: {best.gain:.0f} nats, {100 * best.share:.0f} %")
     model = best.estimate
-    last = compare_candidates(model_set, model, model_set.applicable_effects(), log)
+    last = compare_candidates(
+        model_set, model, model_set.applicable_effects(), log, tolerated_energy(found.first)
+    )
     accepted = (*found.accepted, best)
     share = 1.0 - remaining_energy(model, found.first.floor) / found.first.energy
     return replace(found, model=model, accepted=accepted, last=last, share=share)
