@@ -1,1 +1,1 @@
-"""Criteria that compare models: penalised likelihood, cross-validation, support by recordings."""
+"""Criteria that compare models: gain, explained share, effective sample size, thresholds."""

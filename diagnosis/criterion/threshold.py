@@ -19,20 +19,16 @@ FORMAT = "modewright-thresholds/1"
 class Thresholds:
     """The threshold [nats] of each group of effects, and the `default` one; `origin` in words.
 
-    A group is an effect at all its places. An effect that adds modes needs `mode_factor` times the
-    default, because the observer has additional gains in each mode.
+    A group is an effect at all its places.
     """
 
     groups: Mapping[str, float] = field(default_factory=dict)
     default: float = DEFAULT_THRESHOLD
     origin: str = "the usual threshold"
-    mode_factor: float = 1.0
 
     def threshold_of(self, placed_effect: PlacedEffect) -> float:
         """Return the threshold [nats] of a placed effect."""
-        adds_modes = placed_effect.effect.body.get("regions") is not None
-        usual = self.default * (self.mode_factor if adds_modes else 1.0)
-        return self.groups.get(group_of(placed_effect), usual)
+        return self.groups.get(placed_effect.effect.name, self.default)
 
     @property
     def largest(self) -> float:
@@ -48,11 +44,6 @@ class Thresholds:
 
 DEFAULT_THRESHOLDS = Thresholds()
 """The default threshold for all effects."""
-
-
-def group_of(placed_effect: PlacedEffect) -> str:
-    """Return the name of the group of a placed effect."""
-    return placed_effect.effect.name
 
 
 def format_thresholds(thresholds: Thresholds) -> str:
@@ -75,9 +66,7 @@ def read_thresholds(path: Path) -> Thresholds:
     if not all(_is_positive(value) for value in values):
         raise ValueError(f"{path}: `usual` and each of `effects` is a number of nats above 0")
     origin = str(known.get("origin", "")) or f"those of {path.name}"
-    return Thresholds(
-        {str(k): float(v) for k, v in groups.items()}, float(usual), origin, mode_factor=1.0
-    )
+    return Thresholds({str(k): float(v) for k, v in groups.items()}, float(usual), origin)
 
 
 def _is_positive(value: object) -> bool:

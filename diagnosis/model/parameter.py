@@ -27,9 +27,8 @@ EFFECT_PRIOR_STD = 0.5
 class FreeParameter:
     """A parameter [SI] with a coordinate z: value = start exp(sd z) if `is_log`, else start + sd z.
 
-    sd is `prior_std`. `low` and `high` are its range, `starts` the values from which fits begin. At
-    `restricted_value` the effect reduces to a simpler one, and the models are nested. With
-    `per_recording` each recording has a value of its own.
+    sd is `prior_std`. `low` and `high` are its range, `starts` the values from which fits begin.
+    With `per_recording` each recording has a value of its own.
     """
 
     name: str
@@ -41,7 +40,6 @@ class FreeParameter:
     per_recording: bool = False
     starts: tuple[float, ...] = ()
     unit: str = "1"
-    restricted_value: float | None = None
 
     def value(self, z: float) -> float:
         """Return the value [SI] at a coordinate; it may be outside the range."""
@@ -110,11 +108,10 @@ def _effect_parameter(parameter: Parameter) -> FreeParameter:
     each = fitting.per == "recording"
     place = (parameter.name, value, low, high)
     unit = si_unit(parameter)
-    plain = None if fitting.plain is None else float(fitting.plain)
     if low > 0.0 and value > 0.0:
         sd = EFFECT_PRIOR_STD * math.log(high / low)
-        return FreeParameter(*place, sd, True, each, starts, unit, plain)
-    return FreeParameter(*place, EFFECT_PRIOR_STD * (high - low), False, each, starts, unit, plain)
+        return FreeParameter(*place, sd, True, each, starts, unit)
+    return FreeParameter(*place, EFFECT_PRIOR_STD * (high - low), False, each, starts, unit)
 
 
 def _start_values(parameter: Parameter, value: float) -> tuple[float, ...]:

@@ -31,9 +31,6 @@ from language.text.document import Document
 
 DISTURBANCE_STATE = "drift"
 
-SLOWLY_VARYING_FORMS = ("constant_or_random_walk",)
-"""Forms of an effect's parameter that may change along a recording."""
-
 TIME_DIMENSION = parse_unit("s").dimension.powers
 
 PLACE_KIND_BY_SECTION = {
@@ -80,14 +77,6 @@ class PlacedEffect:
     def qualified_name(self, name: str) -> str:
         """Return the name in the automaton of a name of the effect: `<name>_<suffix>`."""
         return f"{name}_{self.suffix}"
-
-
-def has_parameters(placed_effect: PlacedEffect) -> bool:
-    """Return whether an effect file has a section `parameters`.
-
-    An effect without parameters could not be fitted: it would follow every signal.
-    """
-    return placed_effect.effect.body.get("parameters") is not None
 
 
 def read_effects(folder: Path) -> tuple[Effect, ...]:

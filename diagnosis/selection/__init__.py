@@ -1,1 +1,1 @@
-"""Selection of effects: screening, forward selection, elimination, exchange, thresholds."""
+"""Selection of effects: inter-sample behaviour, screening, comparison, forward selection."""

@@ -12,8 +12,8 @@ from diagnosis.criterion.explained_share import (
     FORM_ERROR,
     MAX_ORDINARY_ENERGY,
     MIN_SHARE,
+    explained_share,
     log_form_weight,
-    remaining_energy,
 )
 from diagnosis.criterion.threshold import DEFAULT_THRESHOLDS, Thresholds
 from diagnosis.estimation.estimate import Estimate
@@ -127,7 +127,7 @@ def _accept(
         model_set, model, model_set.applicable_effects(), log, tolerated_energy(found.first)
     )
     accepted = (*found.accepted, best)
-    share = 1.0 - remaining_energy(model, found.first.floor) / found.first.energy
+    share = explained_share(model, found.base, found.first.floor)
     return replace(found, model=model, accepted=accepted, last=last, share=share)
 
 

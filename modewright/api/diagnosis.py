@@ -195,7 +195,7 @@ def _conclude(
     try:
         diagnosis = run_diagnosis(case, budget.report)
     except BudgetSpent as spent:
-        done = [text for text in budget.lines if text.startswith(("accepted", "recalibrated"))]
+        done = [text for text in budget.lines if text.startswith(("accepted", "base fitted"))]
         advice = "with a larger --budget and the same --out it goes on from there"
         messages = (*reasons, f"not finished: {spent}", *done, advice)
         verdict = undecided_verdict(messages, file_digests(case, case.train), budget.elapsed)

@@ -18,9 +18,9 @@ from diagnosis.equation.forward_regression import (
 from diagnosis.equation.regression_problem import regression_at
 from diagnosis.equation.term_library import ORDERS, LibraryTerm, Signals, generate_terms
 from diagnosis.estimation.model_set import ModelSet
-from diagnosis.estimation.noise_level import disturbance_units
 from diagnosis.localisation.location import Location
 from diagnosis.model.placed_effect import automaton_with_effects
+from diagnosis.selection.comparison import compare_candidates
 from tests.diagnosis.estimation.test_levenberg_marquardt import FRICTION, bench
 from tests.diagnosis.localisation.test_ranking import fit_first_base, with_effect
 
@@ -116,11 +116,12 @@ def test_a_friction_without_a_name_becomes_its_formula(
     base = fit_first_base(hidden)
     excess = regression_at(hidden, base, "flow", "w_em")
     assert rank_terms(excess.problem, excess.columns)[0][1].name == "the sign of w_em"
-    units = disturbance_units(base.candidate, hidden.series, base.values(0))
+    compared = compare_candidates(hidden, base, ())
     locus = Location("flow", "w_em", 100.0, 2.0, free_model=base)
-    found = discover_equation(hidden, base, [locus], units, 45.0)
+    found = discover_equation(hidden, compared, [locus], 45.0)
     assert found is not None
     amount, rest = found.text.split(" N*m * ")
     assert float(amount) == pytest.approx(-FRICTION["T_c_w_em"], rel=0.15)
     assert rest.startswith("tanh(w_em / (")
-    assert found.likelihood_gain.smaller > 100.0
+    assert found.gain > 100.0
+    assert found.share > 0.9

@@ -62,7 +62,5 @@ def test_a_step_is_found_where_changes_drown_the_priors(bench: ModelSet) -> None
         np.full((1, count, count), 1e180),
         np.full((1, count), 1e90),
         np.zeros(count, dtype=bool),
-        np.zeros(1, dtype=np.int64),
-        np.zeros(1, dtype=np.int64),
     )
     assert np.all(np.isfinite(damped_step(candidate, point, normal, 0.0).shared))

@@ -8,17 +8,15 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from diagnosis.criterion.likelihood_gain import likelihood_gain
+from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
 from diagnosis.data.sampled_recording import SampledRecording, decimate
+from diagnosis.estimation.innovations import NoiseLevels, measured_noise_levels
+from diagnosis.estimation.levenberg_marquardt import estimate_parameters
 from diagnosis.estimation.model_set import ModelSet, balance_disturbances
-from diagnosis.estimation.noise_level import (
-    disturbance_units,
-    fit_base,
-    fit_with_noise,
-    recalibrate,
-)
+from diagnosis.estimation.noise_level import ORDINARY_LEVEL, disturbance_units
 from diagnosis.model.candidate import Candidate
 from diagnosis.model.placed_effect import find_placements, shipped_effects
+from diagnosis.selection.comparison import effective_gain
 from language.loading.load import automaton_of
 from language.overlays.expand_document import Project, expand_document, read_document
 from tests.language.spec_builders import ROOT
@@ -67,6 +65,15 @@ def simulate_recordings(
     return tuple(found)
 
 
+def ordinary_noise_levels(
+    candidate: Candidate, series: tuple[SampledRecording, ...]
+) -> NoiseLevels:
+    """The measured noise of the signals, and the ordinary disturbance of each balance."""
+    units = disturbance_units(candidate, series, {})
+    ordinary = {name: ORDINARY_LEVEL * unit for name, unit in units.items()}
+    return measured_noise_levels(series, ordinary)
+
+
 @pytest.fixture(scope="module")
 def bench() -> ModelSet:
     project = Project(ROOT)
@@ -81,8 +88,8 @@ def bench() -> ModelSet:
 def test_a_clean_recording_gives_the_parameters_that_made_it(bench: ModelSet) -> None:
     candidate = bench.compile_candidate(())
     series = simulate_recordings(candidate, TRUTH)
-    units = disturbance_units(candidate, series, {})
-    found = recalibrate(fit_base(candidate, series, units), series, units).values(0)
+    noise_levels = ordinary_noise_levels(candidate, series)
+    found = estimate_parameters(candidate, series, noise_levels, {}).values(0)
     for name, value in TRUTH.items():
         assert found[name] == pytest.approx(value, rel=0.02), name
 
@@ -94,19 +101,16 @@ def test_a_left_out_friction_gains_where_it_is_and_a_lag_does_not(bench: ModelSe
     }
     friction = bench.compile_candidate((layers["coulomb_friction@w_em"],))
     series = simulate_recordings(friction, {**TRUTH, **FRICTION})
-    units = disturbance_units(base, series, {})
-    known = recalibrate(fit_base(base, series, units), series, units)
+    known = estimate_parameters(base, series, ordinary_noise_levels(base, series), {})
     start = {**known.values(0), "T_c_w_em": 0.5}
-    better = fit_with_noise(friction, series, known.noise_levels, start, units)
-    assert likelihood_gain(better, known, series).smaller > 100.0
+    better = estimate_parameters(friction, series, known.noise_levels, start)
+    correlation = integrated_autocorrelation(better, series)
+    assert effective_gain(better, known, correlation, len(series)) > 100.0
     assert better.values(0)["T_c_w_em"] == pytest.approx(2.0, rel=0.1)
     lag = bench.compile_candidate((layers["sensor_lag@w_s"],))
     start = {**known.values(0), "tau_w_s": 0.002}
-    worse = fit_with_noise(lag, series, known.noise_levels, start, units)
-    assert (
-        likelihood_gain(worse, known, series).smaller
-        < likelihood_gain(better, known, series).smaller / 4
-    )
+    worse = estimate_parameters(lag, series, known.noise_levels, start)
+    assert known.cost - worse.cost < (known.cost - better.cost) / 4
 
 
 def test_a_fast_recording_is_thinned_to_means_of_its_inputs() -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from diagnosis.estimation.levenberg_marquardt import estimate_parameters
 from diagnosis.estimation.model_set import ModelSet
-from diagnosis.estimation.noise_level import disturbance_units, fit_with_noise
 from diagnosis.experiment.discrimination import MIN_LOG_BAYES_FACTOR, plan_experiment
 from diagnosis.experiment.manoeuvre import manoeuvres_for
 from diagnosis.model.placed_effect import find_placements
@@ -33,9 +33,8 @@ def test_a_model_is_not_told_from_itself_but_from_one_without_friction(bench: Mo
     base = fit_first_base(hidden)
     layers = {one.id: one for e in bench.effects for one in find_placements(bench.document, e)}
     candidate = hidden.compile_candidate((layers["coulomb_friction@w_em"],))
-    units = disturbance_units(base.candidate, hidden.series, base.values(0))
     start = {**base.values(0), "T_c_w_em": 1.0}
-    friction = fit_with_noise(candidate, hidden.series, base.noise_levels, start, units)
+    friction = estimate_parameters(candidate, hidden.series, base.noise_levels, start)
     same = plan_experiment(hidden, [("a", friction), ("b", friction)])
     assert same is not None
     assert same.options[0].log_bayes_factor < 1.0

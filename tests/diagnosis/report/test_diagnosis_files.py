@@ -67,11 +67,11 @@ class Found:
 
 
 def _killed(folder: Path) -> None:
-    """Kill a run when it has recalibrated the base: it leaves what it goes on from, no more."""
+    """Kill a run when it has fitted the base: it leaves what it goes on from, no more."""
     words = [sys.executable, "-m", "modewright", *COMMAND, "--out", "found"]
     with subprocess.Popen(words, cwd=folder, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr
-        next(line for line in process.stderr if line.startswith("recalibrated"))
+        next(line for line in process.stderr if line.startswith("base fitted"))
         process.send_signal(signal.SIGKILL)
     assert [file.name for file in (folder / "found").glob("*")] == ["stages"]
     assert list((folder / "found" / "stages").glob("*.npz"))

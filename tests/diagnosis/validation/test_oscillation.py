@@ -8,14 +8,14 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from diagnosis.criterion.likelihood_gain import likelihood_gain
+from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
 from diagnosis.data.sampled_recording import SampledRecording
-from diagnosis.estimation import noise_level as level
 from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.levenberg_marquardt import estimate_parameters
 from diagnosis.estimation.model_set import ModelSet, balance_disturbances
-from diagnosis.estimation.noise_level import disturbance_units, fit_base, recalibrate
 from diagnosis.model.placed_effect import find_placements, shipped_effects
 from diagnosis.report.figures import draw_oscillation
+from diagnosis.selection.comparison import effective_gain
 from diagnosis.validation.oscillation import (
     Cycles,
     Oscillation,
@@ -27,6 +27,7 @@ from language.loading.load import automaton_of
 from language.overlays.expand_document import Project, expand_document
 from language.text.diagnostic import Source
 from language.text.project_files import parse_document
+from tests.diagnosis.localisation.test_ranking import fit_first_base
 from tests.generators.open_cases.case import simulate_cases, stream
 from tests.generators.open_cases.recording import sample_recording
 from tests.generators.open_cases.tip_out import VARIANT, tip_out_case
@@ -54,17 +55,15 @@ def bench_of(hidden: bool) -> ModelSet:
 
 
 def fitted(bench: ModelSet) -> tuple[Estimate, dict[str, Estimate]]:
-    """Return the recalibrated base, and it with each effect."""
-    candidate = bench.compile_candidate(())
-    units = disturbance_units(candidate, bench.series, {})
-    base = recalibrate(fit_base(candidate, bench.series, units), bench.series, units)
+    """Return the fitted base, and it with each effect."""
+    base = fit_first_base(bench)
     found = {}
     for effect in bench.effects:
         for layer in find_placements(bench.document, effect):
             start = {**base.values(0), "k_r_half_shaft": 500.0, "F_r_half_shaft": 30.0}
             one = bench.compile_candidate((layer,))
-            found[effect.name] = level.fit_candidate(
-                one, bench.series, base.noise_levels, start, units
+            found[effect.name] = estimate_parameters(
+                one, bench.series, base.noise_levels, start
             )
     return base, found
 
@@ -73,9 +72,11 @@ def fitted(bench: ModelSet) -> tuple[Estimate, dict[str, Estimate]]:
 def test_an_amplitude_dependent_shaft_is_told_named_and_repaired() -> None:
     bench = bench_of(hidden=True)
     base, found = fitted(bench)
-    gains = {name: likelihood_gain(one, base, bench.series) for name, one in found.items()}
-    assert gains["stiffness_hysteresis"].smaller > 45.0
-    assert gains["stiffness_hysteresis"].total > gains["stiffness_nonlinear"].total + 20.0
+    correlation = integrated_autocorrelation(found["stiffness_hysteresis"], bench.series)
+    count = len(bench.series)
+    gains = {k: effective_gain(one, base, correlation, count) for k, one in found.items()}
+    assert gains["stiffness_hysteresis"] > 45.0
+    assert gains["stiffness_hysteresis"] > gains["stiffness_nonlinear"] + 20.0
     before = analyse_oscillation(base, bench.series)
     after = analyse_oscillation(found["stiffness_hysteresis"], bench.series)
     assert before is not None
@@ -117,9 +118,7 @@ def test_without_a_step_there_is_none_and_a_clean_one_is_followed() -> None:
     quiet = tuple(
         dataclasses.replace(one, inputs=np.zeros_like(one.inputs)) for one in bench.series
     )
-    candidate = bench.compile_candidate(())
-    units = disturbance_units(candidate, bench.series, {})
-    base = recalibrate(fit_base(candidate, bench.series, units), bench.series, units)
+    base = fit_first_base(bench)
     assert analyse_oscillation(base, quiet) is None
     clean = analyse_oscillation(base, bench.series)
     assert clean is not None
