@@ -9,7 +9,6 @@ from typing import Any, cast
 import numpy as np
 
 from codegen.predictor.predictor import PredictorColumns
-from diagnosis.criterion.likelihood_gain import LikelihoodGain
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.model_set import EXCLUDED_EFFECTS
 from diagnosis.estimation.normal_equations import NormalEquations
@@ -25,6 +24,7 @@ from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.result.effect_naming import named_effect_of
 from diagnosis.result.verdict import Verdict
 from diagnosis.selection.candidate_search import CandidateFit
+from diagnosis.selection.comparison import Round
 from diagnosis.selection.forward_selection import Selection
 from language.loading.recording_map_reader import read_map
 from language.overlays.effect_reader import added_names
@@ -75,15 +75,12 @@ def make_dossier(project: Project, layers: Sequence[PlacedEffect]) -> DiagnosisR
     candidate = Candidate(tuple(layers), recipe, NOTHING)
     z = np.array([_coordinate(one) for one in uncertain])
     each = np.tile(np.eye(len(z)) * DATA, (2, 1, 1))
-    blocks = np.arange(2)
-    normal = NormalEquations(
-        each, np.zeros((2, len(z))), per_recording_mask(candidate), blocks, blocks
-    )
+    normal = NormalEquations(each, np.zeros((2, len(z))), per_recording_mask(candidate))
     point = ParameterVector(z, np.tile(z, (2, 1)))
     model = Estimate(candidate, point, 0.0, NOTHING, NOTHING, NOTHING, normal)
-    gains = LikelihoodGain(100.0, 90.0, (50.0, 40.0))
-    tried = tuple(CandidateFit(layer, 100.0, model, gains) for layer in layers)
-    selection = Selection(model, model, tried, tried, ())
+    tried = tuple(CandidateFit(layer, 100.0, model, 90.0, 0.9) for layer in layers)
+    compared = Round(model, {}, tried, np.ones(1), 1.0, 1.0)
+    selection = Selection(model, model, tried, compared, compared)
     plain = automaton_with_effects(base, project, ())
     effects = tuple(named_effect_of(layer, model, plain) for layer in layers)
     verdict = Verdict(

@@ -31,9 +31,7 @@ def test_a_stored_candidate_is_read_with_all_its_metadata(
 ) -> None:
     monkeypatch.setattr(compile_cache, "_cache_folder", lambda: tmp_path)
     page = {"J": 1.0}
-    columns = PredictorColumns(
-        "plant", ("w", "drift_w"), ("T",), ("double",), ("w",), (0, 1), page
-    )
+    columns = PredictorColumns("plant", ("w", "drift_w"), ("T",), ("double",), ("w",), (0, 1), page)
     free = FreeParameter("J", 1.0, 0.5, 2.0, 0.2, True, True, (1.0, 1.5), "kg*m^2")
     model = CompiledModel(
         columns, 2, (600.0, 1.0), (free,), ("drift_w",), (0.5,), ("T_d",), (False, True)

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import pytest
-
 from diagnosis.criterion.likelihood_gain import LikelihoodGain
+from tests.diagnosis.selection.test_backward_elimination import DRAG, FRICTION, find_layer
+from tests.diagnosis.validation.test_adequacy import rubbing, select_effect
+
 from diagnosis.criterion.threshold import DEFAULT_THRESHOLD
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.selection.candidate_search import MAX_FITS, CandidateFit, search_candidates
@@ -15,8 +17,6 @@ from diagnosis.selection.output_error import OUTPUT_ERROR_SCREENING_FRACTION
 from diagnosis.selection.screening import ScreeningResult
 from tests.diagnosis.estimation.test_levenberg_marquardt import bench
 from tests.diagnosis.localisation.test_ranking import fit_first_base
-from tests.diagnosis.selection.test_backward_elimination import DRAG, FRICTION, find_layer
-from tests.diagnosis.validation.test_adequacy import rubbing, select_effect
 
 __all__ = ["bench", "rubbing"]
 THIRD = "torque_offset@T_em"

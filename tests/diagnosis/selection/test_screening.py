@@ -1,123 +1,113 @@
-"""Candidates are screened on some recordings first; what others alone show is not lost."""
+"""Screening: a few steps of a candidate from its starts show most of what a fit gains."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from types import SimpleNamespace
+from typing import Any, cast
 
+import numpy as np
 import pytest
 
-from diagnosis.estimation.estimate import Estimate, evaluate
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.levenberg_marquardt import estimate_parameters
 from diagnosis.estimation.model_set import ModelSet
-from diagnosis.estimation.noise_level import disturbance_units, fit_base
 from diagnosis.model.candidate import Candidate
-from diagnosis.model.parameter_vector import ParameterVector, extend_vector, values_at
-from diagnosis.model.placed_effect import find_placements, shipped_effects
-from diagnosis.selection import screening
-from diagnosis.selection.screening import (
-    MAX_SCREENED,
-    MIN_BEST_FRACTION,
-    MIN_SCREENING_GAIN,
-    ScreeningSubset,
-    screen_candidates,
+from diagnosis.model.parameter import FreeParameter
+from diagnosis.model.placed_effect import PlacedEffect, find_placements, shipped_effects
+from diagnosis.selection.screening import screen_candidate, start_values
+from tests.diagnosis.estimation.test_levenberg_marquardt import (
+    FRICTION,
+    TRUTH,
+    bench,
+    simulate_recordings,
 )
-from tests.diagnosis.estimation.test_levenberg_marquardt import TRUTH, bench, simulate_recordings
+from tests.diagnosis.localisation.test_ranking import fit_first_base
 
 __all__ = ["bench"]
-COUNT = 9
-GAIN = 20.0
-ENOUGH = 1000.0
-"""Nats from which on one candidate is held against the others here."""
+COUNT = 6
+"""Recordings, one of which shows the drag of a brake."""
 
 
-def away_on_some(raced: Callable[..., Estimate]) -> Callable[..., Estimate]:
-    """First steps that on some of the recordings lead to where the brake has no drag."""
-
-    def found(
-        part: ScreeningSubset, candidate: Candidate, starts: Sequence[ParameterVector]
-    ) -> Estimate:
-        if len(part.rows) == COUNT:
-            return raced(part, candidate, starts)
-        base, none = part.base, {"T_r_w_w": 0.0, "share_w_w": 0.0}
-        start = extend_vector(candidate, base.candidate, base.point, none)
-        return evaluate(candidate, part.model_set.series, base.noise_levels, start)
-
-    return found
+def layer_of(bench: ModelSet, name: str) -> PlacedEffect:
+    """An effect of the library at a place."""
+    effect = next(one for one in shipped_effects() if one.name == name.partition("@")[0])
+    return next(one for one in find_placements(bench.document, effect) if one.id == name)
 
 
-@pytest.mark.parametrize("leads_away", [False, True])
-@pytest.mark.parametrize("braked", [1, 5])
-def test_what_a_single_recording_shows_is_found_where_it_is_not_looked_at_first(
-    bench: ModelSet, braked: int, leads_away: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Also where steps on recordings that do not show it lead to where it does nothing."""
-    brake = next(one for one in shipped_effects() if one.name == "brake_drag")
-    drag = bench.compile_candidate(tuple(find_placements(bench.document, brake)))
-    base, known = bench.compile_candidate(()), {**TRUTH, "T_r_w_w": 150.0}
+@pytest.fixture(scope="module")
+def rubbing(bench: ModelSet) -> tuple[ModelSet, Estimate]:
+    """Recordings of a driveline with dry friction of the motor, and the base fitted to them."""
+    friction = bench.compile_candidate((layer_of(bench, "coulomb_friction@w_em"),))
+    series = simulate_recordings(friction, {**TRUTH, **FRICTION})
+    model_set = dataclasses.replace(bench, series=series)
+    return model_set, fit_first_base(model_set)
+
+
+def test_a_few_steps_show_most_of_what_a_fit_gains(rubbing: tuple[ModelSet, Estimate]) -> None:
+    model_set, base = rubbing
+    candidate = model_set.compile_candidate((layer_of(model_set, "coulomb_friction@w_em"),))
+    screened = screen_candidate(model_set, base, candidate)
+    fitted = estimate_parameters(
+        candidate, model_set.series, base.noise_levels, {**base.values(0), **FRICTION}
+    )
+    assert fitted.cost <= screened.cost + 1.0
+    assert base.cost - screened.cost > 0.8 * (base.cost - fitted.cost) > 100.0
+    assert screened.values(0)["T_c_w_em"] == pytest.approx(FRICTION["T_c_w_em"], rel=0.2)
+    assert screened.noise_levels == base.noise_levels
+
+
+def test_an_effect_that_does_not_act_gains_little(rubbing: tuple[ModelSet, Estimate]) -> None:
+    model_set, base = rubbing
+    gains = []
+    for name in ("coulomb_friction@w_em", "sensor_lag@w_em"):
+        candidate = model_set.compile_candidate((layer_of(model_set, name),))
+        gains.append(base.cost - screen_candidate(model_set, base, candidate).cost)
+    assert gains[1] < 0.25 * gains[0]
+
+
+def test_an_effect_that_a_single_recording_shows_is_found(bench: ModelSet) -> None:
+    drag = bench.compile_candidate(
+        (next(iter(find_placements(bench.document, layer_of(bench, "brake_drag@w_w").effect))),)
+    )
+    known = {**TRUTH, "T_r_w_w": 150.0}
     free, held = simulate_recordings(drag, known), simulate_recordings(drag, known, brake=300.0)
     series = tuple(
-        dataclasses.replace((held if k == braked else free)[k % 2], name=f"{k}")
-        for k in range(COUNT)
+        dataclasses.replace((held if k == 1 else free)[k % 2], name=f"{k}") for k in range(COUNT)
     )
-    assert len(series) > MAX_SCREENED
-    own = dataclasses.replace(bench, series=series, _compiled={})
-    fitted = fit_base(base, series, disturbance_units(base, series, {}))
-    if leads_away:
-        monkeypatch.setattr(screening, "_halve_starts", away_on_some(screening._halve_starts))
-    (promise,) = screen_candidates(
-        own, fitted, [(drag.placed_effects[0], drag)], MIN_SCREENING_GAIN
-    )
-    assert promise.start is not None
-    assert promise.gain > GAIN
+    own = dataclasses.replace(bench, series=series)
+    base = fit_first_base(own)
+    assert base.cost - screen_candidate(own, base, drag).cost > 20.0
 
 
-def test_what_is_far_behind_is_not_followed_further(
-    bench: ModelSet, monkeypatch: pytest.MonkeyPatch
+def test_a_candidate_that_diverges_has_an_infinite_cost(
+    rubbing: tuple[ModelSet, Estimate],
 ) -> None:
-    """Beside dry friction of the motor an offset of its torque takes its first steps alone."""
-    monkeypatch.setattr(screening, "STRONG_GAIN", ENOUGH)
-    layers = {
-        layer.id: layer for e in shipped_effects() for layer in find_placements(bench.document, e)
-    }
-    names = ("coulomb_friction@w_em", "torque_gain@T_br")
-    known = [(layers[name], bench.compile_candidate((layers[name],))) for name in names]
-    series = simulate_recordings(known[0][1], {**TRUTH, "T_c_w_em": 40.0})
-    own = dataclasses.replace(bench, series=series, _compiled={})
-    base = bench.compile_candidate(())
-    fitted = fit_base(base, series, disturbance_units(base, series, {}))
-    first, second = screen_candidates(own, fitted, known, MIN_SCREENING_GAIN)
-    assert (first.placed_effect.id, second.placed_effect.id) == names
-    assert first.gain > ENOUGH
-    assert first.start is not None
-    assert second.gain < MIN_BEST_FRACTION * first.gain
-    assert second.start is None
+    model_set, base = rubbing
+    candidate = model_set.compile_candidate((layer_of(model_set, "coulomb_friction@w_em"),))
+    huge = tuple(dataclasses.replace(one, inputs=one.inputs + np.inf) for one in model_set.series)
+    lost = dataclasses.replace(model_set, series=huge)
+    assert screen_candidate(lost, base, candidate).cost == np.inf
 
 
-@pytest.mark.parametrize(
-    ("alone", "is_there"), [({}, False), ({"T_c_w_em": 33.0}, True), ({"k": 33.0}, False)]
-)
-def test_a_candidate_starts_where_it_was_fitted_alone_too(
-    bench: ModelSet, alone: dict[str, float], is_there: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Not with a parameter that the effect does not bring."""
-    layers = {
-        layer.id: layer for e in shipped_effects() for layer in find_placements(bench.document, e)
-    }
-    rubs = layers["coulomb_friction@w_em"]
-    candidate, base = bench.compile_candidate((rubs,)), bench.compile_candidate(())
-    series = simulate_recordings(candidate, {**TRUTH, "T_c_w_em": 40.0})
-    own = dataclasses.replace(bench, series=series, _compiled={})
-    fitted = fit_base(base, series, disturbance_units(base, series, {}))
-    begun: list[list[float]] = []
-    raced = screening._halve_starts
+def candidate_with(*parameters: FreeParameter) -> Candidate:
+    """A candidate of which only the free parameters are known."""
+    return cast(Candidate, cast(Any, SimpleNamespace(free_parameters=parameters)))
 
-    def looking(
-        part: ScreeningSubset, one: Candidate, starts: Sequence[ParameterVector]
-    ) -> Estimate:
-        begun.append([round(values_at(one, start, 0)["T_c_w_em"], 6) for start in starts])
-        return raced(part, one, starts)
 
-    monkeypatch.setattr(screening, "_halve_starts", looking)
-    screen_candidates(own, fitted, [(rubs, candidate)], MIN_SCREENING_GAIN, {rubs.id: alone})
-    assert [33.0 in starts for starts in begun] == [is_there] * len(begun)
-    assert begun
+def test_there_are_as_many_starts_as_the_longest_list_has() -> None:
+    free = FreeParameter("own", 1.0, 0.1, 9.0, 1.0, False, starts=(1.0, 2.0, 3.0))
+    short = dataclasses.replace(free, name="short", starts=(4.0, 5.0))
+    phase = dataclasses.replace(free, name="phase", per_recording=True, starts=(0.0, 1.0, 2.0, 3.0))
+    known = dataclasses.replace(free, name="known", starts=(7.0, 8.0, 9.0, 10.0))
+    candidate = candidate_with(free, known, short, phase)
+    assert start_values(candidate, {"known": 7.5}) == [
+        {"own": 1.0, "short": 4.0, "phase": 0.0},
+        {"own": 2.0, "short": 5.0, "phase": 1.0},
+        {"own": 3.0, "short": 5.0, "phase": 2.0},
+    ]
+
+
+def test_without_parameters_of_its_own_a_candidate_has_one_start() -> None:
+    known = FreeParameter("known", 1.0, 0.1, 9.0, 1.0, False, starts=(1.0, 2.0))
+    assert start_values(candidate_with(known), {"known": 7.5}) == [{}]

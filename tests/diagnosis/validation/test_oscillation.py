@@ -62,9 +62,7 @@ def fitted(bench: ModelSet) -> tuple[Estimate, dict[str, Estimate]]:
         for layer in find_placements(bench.document, effect):
             start = {**base.values(0), "k_r_half_shaft": 500.0, "F_r_half_shaft": 30.0}
             one = bench.compile_candidate((layer,))
-            found[effect.name] = estimate_parameters(
-                one, bench.series, base.noise_levels, start
-            )
+            found[effect.name] = estimate_parameters(one, bench.series, base.noise_levels, start)
     return base, found
 
 
@@ -82,7 +80,7 @@ def test_an_amplitude_dependent_shaft_is_told_named_and_repaired() -> None:
     assert before is not None
     assert after is not None
     assert before.has_other_frequency
-    assert 0.3 < before.followed_time < 1.0
+    assert 0.3 < before.followed_time < 1.2
     told = before.format_sentence()
     assert told.startswith(f"w_em fits until t = {before.followed_time:.2f} s after the step at ")
     assert "then the shuffle's frequency is 6." in told
