@@ -48,13 +48,14 @@ outputs: [w]
 EFFECTS = ("coulomb_friction", "torque_gain", "unknown_input", "viscous_friction")
 J, B, T_C = 0.55, 0.12, 2.0
 """What the rotor really has: inertia [kg*m^2], viscous [N*m*s/rad] and dry friction [N*m]."""
-RATE, SECONDS, FINE = 100, 10, 20
+RATE, SECONDS, FINE, LATE = 100, 10, 20, 30
 
 
 def write_project(folder: Path, T_c: float = T_C, hit: float = 0.0) -> Path:
     """Make a project with recordings `run_0.csv` ... `run_2.csv` and a library of effects.
 
-    In each a torque that is not recorded acts for a second: a `hit` [N*m].
+    In each a torque that is not recorded acts for a second: a `hit` [N*m], `LATE` samples after a
+    step of the recorded one.
     """
     (folder / "spec").mkdir(parents=True)
     (folder / "spec" / "spinner.yaml").write_text(SPEC, "utf-8")
@@ -77,7 +78,7 @@ def recordings(T_c: float, hit: float = 0.0) -> Sequence[np.ndarray]:
     h = 1.0 / (RATE * FINE)
     for k in range(count):
         seen[:, k] = w
-        struck = np.where(k // RATE == np.array([2, 5, 7]), hit, 0.0)
+        struck = np.where((k - LATE) // RATE == np.array([2, 5, 7]), hit, 0.0)
         for _ in range(FINE):
             w = w + h * (T[:, k] + struck - B * w - T_c * np.tanh(w / 0.1)) / J
     seen = seen + random.normal(0.0, 0.05, seen.shape)

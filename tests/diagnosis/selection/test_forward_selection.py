@@ -1,100 +1,237 @@
-"""Which candidates are fitted, and when a further effect is not taken."""
+"""Forward selection: what is accepted, with which rivals, and when nothing or a pair is."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from fractions import Fraction
 
+import numpy as np
 import pytest
-from diagnosis.criterion.likelihood_gain import LikelihoodGain
-from tests.diagnosis.selection.test_backward_elimination import DRAG, FRICTION, find_layer
-from tests.diagnosis.validation.test_adequacy import rubbing, select_effect
 
-from diagnosis.criterion.threshold import DEFAULT_THRESHOLD
-from diagnosis.estimation.model_set import ModelSet
-from diagnosis.selection.candidate_search import MAX_FITS, CandidateFit, search_candidates
-from diagnosis.selection.forward_selection import MAX_EFFECTS, SCREENING_FRACTION, select_effects
-from diagnosis.selection.output_error import OUTPUT_ERROR_SCREENING_FRACTION
-from diagnosis.selection.screening import ScreeningResult
-from tests.diagnosis.estimation.test_levenberg_marquardt import bench
-from tests.diagnosis.localisation.test_ranking import fit_first_base
-
-__all__ = ["bench", "rubbing"]
-THIRD = "torque_offset@T_em"
-WORTH = 5
-"""Place of what a candidate has to promise among what a search is given."""
-
-
-def test_what_some_recordings_alone_promise_takes_no_turn_of_a_fit(
-    bench: ModelSet, rubbing: ModelSet, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Candidates that were not looked at on all recordings promise most; none can be fitted."""
-    friction = select_effect(bench, rubbing, FRICTION)
-    unseen = [ScreeningResult(find_layer(bench, DRAG), 1e6)] * MAX_FITS
-    seen = ScreeningResult(find_layer(bench, FRICTION), 1e3, friction.model)
-    monkeypatch.setattr(
-        "diagnosis.selection.candidate_search.screen_candidates", lambda *_: [*unseen, seen]
-    )
-    found = search_candidates(rubbing, friction.base, {}, [])
-    assert [one.placed_effect.id for one in found if one.likelihood_gain] == [FRICTION]
-    assert len(found) == MAX_FITS + 1
-
-
-@pytest.mark.parametrize("strained", [2, MAX_EFFECTS, MAX_EFFECTS + 1])
-def test_a_last_effect_that_pulls_the_others_out_of_their_ranges_is_not_taken(
-    bench: ModelSet, rubbing: ModelSet, monkeypatch: pytest.MonkeyPatch, strained: int
-) -> None:
-    """So many effects are strained together; what was strained before it is left to the verdict."""
-    model = select_effect(bench, rubbing, FRICTION).model
-    gains = iter(LikelihoodGain(gain, gain, (gain / 9.0,) * 9) for gain in (9000.0, 900.0, 300.0))
-    names = iter((FRICTION, DRAG, THIRD))
-
-    def found(*_: object) -> list[CandidateFit]:
-        return [CandidateFit(find_layer(bench, next(names)), 9000.0, model, next(gains))]
-
-    def many(_: object, accepted: Sequence[CandidateFit]) -> bool:
-        return len(accepted) >= strained
-
-    monkeypatch.setattr("diagnosis.selection.forward_selection.search_candidates", found)
-    monkeypatch.setattr(
-        "diagnosis.selection.forward_selection.rescreen_after_refit",
-        lambda _, m, u, tried, *__: (None, tried),
-    )
-    monkeypatch.setattr(
-        "diagnosis.selection.forward_selection.choose_form", lambda _, m, u, best, tried: best
-    )
-    monkeypatch.setattr(
-        "diagnosis.selection.forward_selection.exchange_effects",
-        lambda _, m, before, *__: (before, m),
-    )
-    monkeypatch.setattr(
-        "diagnosis.selection.forward_selection.meets_stopping_rule", lambda *_: False
-    )
-    monkeypatch.setattr(
-        "diagnosis.selection.forward_selection.eliminate_backward", lambda _, kept, *__: kept
-    )
-    monkeypatch.setattr("diagnosis.selection.forward_selection.rejects_bounds", many)
-    accepted = select_effects(rubbing, fit_first_base(rubbing), {}).accepted
-    assert len(accepted) == (MAX_EFFECTS - 1 if strained == MAX_EFFECTS else MAX_EFFECTS)
-
-
-@pytest.mark.parametrize(
-    ("hope", "least"),
-    [
-        (SCREENING_FRACTION, 0.25 * DEFAULT_THRESHOLD),
-        (OUTPUT_ERROR_SCREENING_FRACTION, 0.1 * DEFAULT_THRESHOLD),
-    ],
+from diagnosis.criterion.explained_share import MAX_ORDINARY_ENERGY, MIN_SHARE
+from diagnosis.criterion.threshold import DEFAULT_THRESHOLD, Thresholds
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.model_set import ModelSet, balance_disturbances
+from diagnosis.model.placed_effect import PlacedEffect, shipped_effects
+from diagnosis.selection import forward_selection
+from diagnosis.selection.comparison import Round, compare_candidates, effective_gain
+from diagnosis.selection.forward_selection import (
+    MAX_EFFECTS,
+    Selection,
+    candidate_probabilities,
+    select_effects,
+    tolerated_energy,
 )
-def test_a_candidate_has_to_promise_a_part_of_what_it_must_gain(
-    rubbing: ModelSet, monkeypatch: pytest.MonkeyPatch, hope: float, least: float
+from diagnosis.selection.intersample import fit_base
+from tests.diagnosis.rotor_project import EFFECTS, RATE, T_C, recordings
+from tests.diagnosis.selection.fake_fits import fit_of, places_of, rotor_model_set, round_of, tried
+
+FRICTION = "coulomb_friction@w"
+COST = 5000.0
+GAIN = 10.0 * DEFAULT_THRESHOLD
+
+
+def rotor(T_c: float) -> ModelSet:
+    """Two recordings of a rotor with dry friction, and a library of effects."""
+    effects = [one for one in shipped_effects() if one.name in EFFECTS]
+    blank = rotor_model_set(effects)
+    series = [
+        SampledRecording(f"{k}", Fraction(1, RATE), Fraction(0), rows[:, :1], rows[:, 1:])
+        for k, rows in enumerate(map(np.ascontiguousarray, recordings(T_c)[:2]))
+    ]
+    drifts = balance_disturbances(blank.document, blank.automaton)
+    return dataclasses.replace(blank, series=tuple(series), disturbances=drifts)
+
+
+@pytest.fixture(scope="module")
+def rubbing() -> Selection:
+    """What is selected for a rotor with dry friction."""
+    return select_effects(*fit_base(rotor(T_C)))
+
+
+def test_the_effect_that_is_missing_is_accepted_alone(rubbing: Selection) -> None:
+    (accepted,) = rubbing.accepted
+    assert accepted.placed_effect.id == FRICTION
+    assert accepted.gain > DEFAULT_THRESHOLD
+    assert rubbing.share > 0.9
+    assert accepted.share == pytest.approx(rubbing.share)
+    assert rubbing.model is accepted.estimate
+    assert rubbing.model.values(0)["T_c_w"] == pytest.approx(T_C, rel=0.05)
+    assert not rubbing.first.is_ordinary
+    assert rubbing.last.is_ordinary
+    assert rubbing.last.base is rubbing.model
+
+
+def test_its_probability_is_largest_and_all_sum_to_1(rubbing: Selection) -> None:
+    probabilities = rubbing.probabilities()
+    assert sum(probabilities.values()) == pytest.approx(1.0)
+    assert max(probabilities, key=lambda name: probabilities[name]) == FRICTION
+    assert probabilities.keys() == {
+        "other",
+        *(one.placed_effect.id for one in rubbing.first_round if one.is_fitted),
+    }
+    assert FRICTION not in [one.placed_effect.id for one in rubbing.rivals]
+
+
+def test_a_comparison_orders_candidates_by_gain_and_bounds_shares(rubbing: Selection) -> None:
+    first = rubbing.first
+    gains = [one.gain for one in first.candidates]
+    assert gains == sorted(gains, reverse=True)
+    assert first.free.keys() == {"flow.w", "outputs.w"}
+    assert first.correlation >= 1.0
+    for one in first.candidates:
+        assert one.share <= 1.0
+        if one.estimate is not None:
+            assert np.all(one.estimate.prediction.variances >= first.floor)
+    best = first.candidates[0]
+    assert best.estimate is not None
+    assert best.gain == effective_gain(best.estimate, first.base, first.correlation, 2)
+    assert first.total_gain >= best.gain
+
+
+def test_on_recordings_of_the_base_nothing_is_accepted() -> None:
+    model_set, base = fit_base(rotor(0.0))
+    found = select_effects(model_set, base)
+    assert found.accepted == ()
+    assert found.rivals == ()
+    assert found.model is base
+    assert found.first is found.last
+    assert found.share == 0.0
+    assert found.first.is_ordinary
+    assert sum(found.probabilities().values()) == pytest.approx(1.0)
+
+
+def test_candidates_are_not_fitted_where_little_is_left() -> None:
+    model_set, base = fit_base(rotor(0.0))
+    found = compare_candidates(
+        model_set, base, model_set.applicable_effects(), least_energy=MAX_ORDINARY_ENERGY
+    )
+    assert found.candidates == ()
+    assert found.free.keys() == {"flow.w", "outputs.w"}
+
+
+# Rounds with given gains and shares
+
+Rounds = Callable[[Estimate], Round]
+
+
+@pytest.fixture
+def places() -> list[PlacedEffect]:
+    return places_of(rotor_model_set(), shipped_effects(), MAX_EFFECTS + 2)
+
+
+def select(
+    monkeypatch: pytest.MonkeyPatch,
+    rounds: Sequence[Rounds],
+    thresholds: Thresholds | None = None,
+) -> tuple[Selection, list[str]]:
+    """The selection from one comparison after the other; asking for more of them is an error."""
+    given: Iterator[Rounds] = iter(rounds)
+    lines: list[str] = []
+
+    def compare(_: ModelSet, base: Estimate, __: Iterable[PlacedEffect], *___: object) -> Round:
+        return next(given)(base)
+
+    monkeypatch.setattr(forward_selection, "compare_candidates", compare)
+    found = select_effects(
+        rotor_model_set(), fit_of((), COST, [11.0]), thresholds or Thresholds(), lines.append
+    )
+    assert next(given, None) is None
+    return found, lines
+
+
+def beside(*candidates: tuple[PlacedEffect, float, float], total: float = 0.0) -> Rounds:
+    """A comparison with candidates of given gains and shares."""
+    return lambda base: round_of(base, [tried(base, *one) for one in candidates], total=total)
+
+
+def test_an_effect_below_its_threshold_is_not_accepted(
+    monkeypatch: pytest.MonkeyPatch, places: list[PlacedEffect]
 ) -> None:
-    """A quarter, but where whole simulations are judged: a tenth (decision 0040)."""
-    asked: list[object] = []
+    round_ = beside((places[0], DEFAULT_THRESHOLD - 0.1, 0.99))
+    assert select(monkeypatch, [round_])[0].accepted == ()
+    group = Thresholds({places[0].effect.name: DEFAULT_THRESHOLD - 1.0})
+    found, lines = select(monkeypatch, [round_, beside()], group)
+    assert [one.placed_effect for one in found.accepted] == [places[0]]
+    assert lines == [f"accepted {places[0].id}: 20 nats, 99 %"]
 
-    def found(*given: object) -> list[CandidateFit]:
-        asked.append(given[WORTH])
-        return []
 
-    monkeypatch.setattr("diagnosis.selection.forward_selection.search_candidates", found)
-    selection = select_effects(rubbing, fit_first_base(rubbing), {}, screening_fraction=hope)
-    assert not selection.accepted
-    assert asked == [pytest.approx(least)]
+def test_an_effect_that_explains_little_is_not_accepted(
+    monkeypatch: pytest.MonkeyPatch, places: list[PlacedEffect]
+) -> None:
+    """A second effect is tried beside it, in vain."""
+    little = MIN_SHARE - 0.01
+    rounds = [beside((places[0], GAIN, little)), beside((places[1], GAIN, little))]
+    found, lines = select(monkeypatch, rounds)
+    assert found.accepted == ()
+    assert found.model is found.base
+    assert found.last is found.first
+    assert lines[-1] == f"not accepted {places[0].id}: it explains 68 %"
+
+
+def test_two_effects_that_explain_most_together_are_both_accepted(
+    monkeypatch: pytest.MonkeyPatch, places: list[PlacedEffect]
+) -> None:
+    rounds = [beside((places[0], GAIN, 0.5)), beside((places[1], GAIN, 0.9)), beside()]
+    found, _ = select(monkeypatch, rounds)
+    assert [one.placed_effect for one in found.accepted] == places[:2]
+    assert found.share == pytest.approx(0.9)
+    assert found.rivals == ()
+
+
+def test_at_most_so_many_effects_are_accepted(
+    monkeypatch: pytest.MonkeyPatch, places: list[PlacedEffect]
+) -> None:
+    rounds = [beside((one, GAIN, 0.9)) for one in places[: MAX_EFFECTS + 1]]
+    found, _ = select(monkeypatch, rounds)
+    assert [one.placed_effect for one in found.accepted] == places[:MAX_EFFECTS]
+
+
+def test_the_candidate_of_largest_gain_is_taken_whatever_others_explain(
+    monkeypatch: pytest.MonkeyPatch, places: list[PlacedEffect]
+) -> None:
+    rounds = [beside((places[0], GAIN + 1.0, 0.8), (places[1], GAIN, 0.95)), beside()]
+    found, _ = select(monkeypatch, rounds)
+    assert [one.placed_effect for one in found.accepted] == places[:1]
+
+
+def test_rivals_are_the_candidates_of_the_smallest_probable_set(
+    monkeypatch: pytest.MonkeyPatch, places: list[PlacedEffect]
+) -> None:
+    """What explains as much is a rival, what explains far less is none."""
+    first = beside(
+        (places[0], GAIN, 0.97), (places[1], GAIN - 1.0, 0.96), (places[2], 9.0, 0.2), total=1e6
+    )
+    found, _ = select(monkeypatch, [first, beside()])
+    assert [one.placed_effect for one in found.rivals] == [places[1]]
+    probabilities = found.probabilities()
+    assert probabilities[places[1].id] > 0.2
+    assert probabilities[places[2].id] < 1e-3
+    alone, _ = select(monkeypatch, [beside((places[0], GAIN, 0.97), total=1e6), beside()])
+    assert alone.rivals == ()
+
+
+def test_an_unfitted_candidate_has_no_probability(places: list[PlacedEffect]) -> None:
+    base = fit_of((), COST, [11.0])
+    candidates = [tried(base, places[0], GAIN, 0.9), tried(base, places[1], 1.0, 0.0, False)]
+    probabilities = candidate_probabilities(round_of(base, candidates))
+    assert probabilities.keys() == {places[0].id, "other"}
+    assert sum(probabilities.values()) == pytest.approx(1.0)
+    assert candidate_probabilities(round_of(base, [])) == {"other": 1.0}
+
+
+def test_the_tolerated_energy_is_the_error_of_the_form_or_an_ordinary_one() -> None:
+    base = fit_of((), COST)
+    assert tolerated_energy(round_of(base, (), energy=1.0)) == pytest.approx(0.09)
+    assert tolerated_energy(round_of(base, (), energy=1e4)) == MAX_ORDINARY_ENERGY
+
+
+def test_a_gain_is_reduced_by_the_autocorrelation_and_the_price_of_parameters(
+    places: list[PlacedEffect],
+) -> None:
+    base, model = fit_of((), COST), fit_of(places[:2], COST - 100.0)
+    price = 2 / 2 * np.log(1000.0 / 4.0)
+    assert effective_gain(model, base, 4.0, 1) == pytest.approx(100.0 / 4.0 - price)
+    assert effective_gain(base, base, 4.0, 1) == 0.0
