@@ -58,16 +58,18 @@ def explained_share(model: Estimate, base: Estimate, floor: Reals) -> float:
     return 1.0 - remaining_energy(model, floor) / whole if whole > 0.0 else 0.0
 
 
-def log_form_weight(remaining: float | None, total_gain: float) -> float:
+def log_form_weight(remaining: float | None, total_gain: float, parameters: int = 0) -> float:
     """Return the logarithm of the posterior mass of an effect that leaves a part of the energy.
 
     The errors of the form are `FORM_SAMPLES` (16) normal variables of variance `FORM_ERROR`^2
     relative to the effect, plus that of the noise, FORM_SAMPLES / (2 total_gain). `total_gain`
     [nats] is the gain of the best model over the base. None for `remaining` gives the weight of an
-    unknown disturbance, whose variance is the one that fits best.
+    unknown disturbance, whose variance is the one that fits best. Each of the `parameters` of the
+    effect costs log(FORM_SAMPLES) / 2.
     """
     noise = FORM_SAMPLES / (2.0 * max(total_gain, 1.0))
     variance = FORM_ERROR**2 + noise
     if remaining is None:
         variance, remaining = 1.0 + noise, 1.0
-    return -FORM_SAMPLES / 2.0 * (math.log(variance) + (max(remaining, 0.0) + noise) / variance)
+    misfit = math.log(variance) + (max(remaining, 0.0) + noise) / variance
+    return -FORM_SAMPLES / 2.0 * misfit - parameters / 2.0 * math.log(FORM_SAMPLES)

@@ -85,8 +85,6 @@ def compare_candidates(
     found = search_candidates(model_set, base, placed_effects, start, log)
     fits = [one.estimate for one in found if one.estimate is not None]
     floor = least_variances([base, *free.values(), *fits])
-    if is_simulated:
-        floor = np.minimum(floor, base.noise_levels.outputs**2)
     best = min([base, *fits], key=lambda one: one.cost)
     correlation = integrated_autocorrelation(best, model_set.series)
     recordings = len(model_set.series)

@@ -18,6 +18,7 @@ from diagnosis.criterion.explained_share import (
 from diagnosis.criterion.threshold import DEFAULT_THRESHOLDS, Thresholds
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.model_set import ModelSet
+from diagnosis.model.placed_effect import effect_names
 from diagnosis.selection.candidate_search import CandidateFit
 from diagnosis.selection.comparison import Round, compare_candidates
 from diagnosis.selection.intersample import LogCallback
@@ -62,7 +63,7 @@ def candidate_probabilities(compared: Round) -> dict[str, float]:
     """
     noise = compared.total_gain
     weights = {
-        one.placed_effect.id: log_form_weight(1.0 - one.share, noise)
+        one.placed_effect.id: log_form_weight(1.0 - one.share, noise, _own_count(one))
         for one in compared.candidates
         if one.is_fitted
     }
@@ -71,6 +72,13 @@ def candidate_probabilities(compared: Round) -> dict[str, float]:
     masses = {name: math.exp(weight - most) for name, weight in weights.items()}
     whole = sum(masses.values())
     return {name: mass / whole for name, mass in masses.items()}
+
+
+def _own_count(candidate: CandidateFit) -> int:
+    """Return the number of parameters of the effect of a fitted candidate."""
+    own = effect_names(candidate.placed_effect)
+    assert candidate.estimate is not None
+    return sum(name in own for name in candidate.estimate.candidate.names)
 
 
 def select_effects(

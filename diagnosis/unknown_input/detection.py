@@ -7,7 +7,7 @@ it is accepted only if it is small most of the time and independent of what is k
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -33,6 +33,8 @@ ENERGY_FRACTION = 0.8
 """Part of the squares of a disturbance that its largest samples have."""
 MAX_ACTIVE_FRACTION = 0.22
 """Largest part of all samples that these are, for an input that acts in windows."""
+NEAR_BEST_FRACTION = 0.9
+"""Part of the largest gain of a place from which another one may be that of the input."""
 MAX_CORRELATION = 0.6
 """Correlation with a known quantity above which a disturbance is no unknown input."""
 MAX_INPUT_DEPENDENCE = 0.4
@@ -50,18 +52,15 @@ def detect_unknown_input(
     """Return the selection with an unknown input, and the locations with its time course.
 
     It is tried where the model with the accepted effects leaves more than an ordinary disturbance:
-    at the balance whose free disturbance costs least. It comes first if no effect was accepted,
+    at the balances whose free disturbances gain most. It comes first if no effect was accepted,
     else behind the effects. Both arguments are returned if the disturbance does not act in windows.
     """
     effects = _unknown_input_effects(model_set)
     if selection.last.is_ordinary or not effects:
         return selection, tuple(locations)
     remaining = localise(model_set, selection.model) if selection.accepted else tuple(locations)
-    place = next((one for one in remaining if one.path in effects), None)
+    place = _find_place(model_set, remaining, effects)
     if place is None:
-        return selection, tuple(locations)
-    place = with_smoothed_disturbances(model_set, place)
-    if not _is_unknown_input(model_set, place):
         return selection, tuple(locations)
     assert place.free_model is not None
     refitted = _refit_on_inactive_intervals(model_set, place, place.free_model)
@@ -75,6 +74,21 @@ def detect_unknown_input(
         selection, model=model, accepted=(*selection.accepted, hidden), rivals=()
     )
     return selection, (refitted, *(one for one in locations if one.path != place.path))
+
+
+def _find_place(
+    model_set: ModelSet, locations: Sequence[Location], effects: Mapping[str, PlacedEffect]
+) -> Location | None:
+    """Return the first balance of those with nearly the largest gain whose disturbance acts in
+    windows, smoothed; None if there is none.
+    """
+    most = max((one.gain for one in locations), default=0.0)
+    for one in locations:
+        if one.path in effects and one.gain > NEAR_BEST_FRACTION * most:
+            smoothed = with_smoothed_disturbances(model_set, one)
+            if _is_unknown_input(model_set, smoothed):
+                return smoothed
+    return None
 
 
 def _is_unknown_input(model_set: ModelSet, location: Location) -> bool:
