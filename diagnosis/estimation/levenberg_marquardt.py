@@ -28,6 +28,7 @@ from diagnosis.model.candidate import Candidate
 from diagnosis.model.parameter_vector import ParameterVector, vector_of
 
 MAX_ITERATIONS = 15
+"""Steps with one difference Jacobian and Broyden updates."""
 MIN_GAIN = 0.3
 """An iteration that gains less than this [nats] is the last one."""
 MIN_GAIN_BROYDEN = 2.0
@@ -58,21 +59,14 @@ def estimate_parameters(
     series: Sequence[SampledRecording],
     noise_levels: NoiseLevels,
     start: Mapping[str, float] | ParameterVector,
-    max_iterations: int = MAX_ITERATIONS,
-    jacobian: Jacobian | None = None,
 ) -> Estimate:
     """Return the candidate at the point of least cost, found from `start`.
 
     `start` is a vector, or values [SI] of some parameters (the others start at their first start
     value, or at their declared value). The steps of `iterate` are followed by `refine`. If the cost
-    at the start is infinite, the start is returned, without normal equations. `jacobian` is an
-    approximate Jacobian near the start.
+    at the start is infinite, the start is returned, without normal equations.
     """
-    return refine(
-        iterate(candidate, series, noise_levels, start, max_iterations, jacobian),
-        series,
-        max_iterations,
-    )
+    return refine(iterate(candidate, series, noise_levels, start), series)
 
 
 def iterate_broyden(
@@ -80,20 +74,16 @@ def iterate_broyden(
     series: Sequence[SampledRecording],
     noise_levels: NoiseLevels,
     start: Mapping[str, float] | ParameterVector,
-    max_iterations: int = MAX_ITERATIONS,
-    jacobian: Jacobian | None = None,
-    nearby: Estimate | None = None,
+    max_iterations: int,
 ) -> Estimate:
     """Return the result of damped steps with one difference Jacobian and Broyden updates.
 
     The steps end after `max_iterations`, when one gains less than `MIN_GAIN_BROYDEN` (2 nats), or
     when none lowers the cost. The result has the updated Jacobian at its point. If the cost at the
-    start is infinite, the start is returned. `nearby` is an estimate of a similar model whose
-    operating points are tried at the start; `jacobian` gives columns that are not computed by
-    differences.
+    start is infinite, the start is returned.
     """
     return _iterate_from(
-        candidate, series, noise_levels, start, max_iterations, jacobian, nearby
+        candidate, series, noise_levels, start, max_iterations, None, None
     ).with_jacobian(series)
 
 
@@ -102,16 +92,17 @@ def iterate(
     series: Sequence[SampledRecording],
     noise_levels: NoiseLevels,
     start: Mapping[str, float] | ParameterVector,
-    max_iterations: int = MAX_ITERATIONS,
     jacobian: Jacobian | None = None,
     nearby: Estimate | None = None,
 ) -> Estimate:
-    """Return the same point as `iterate_broyden`, without an updated Jacobian at the end.
+    """Return the point of `iterate_broyden` after at most `MAX_ITERATIONS` (15) steps.
 
     Normal equations and Jacobian of the result are None and empty, or those of an earlier point.
+    `nearby` is an estimate of a similar model whose operating points are tried at the start;
+    `jacobian` gives columns that are not computed by differences.
     """
     return _iterate_from(
-        candidate, series, noise_levels, start, max_iterations, jacobian, nearby
+        candidate, series, noise_levels, start, MAX_ITERATIONS, jacobian, nearby
     ).estimate
 
 
@@ -134,20 +125,18 @@ def _iterate_from(
     return _iterate_steps(with_normal_equations(now, series, jacobian), series, max_iterations)
 
 
-def refine(
-    estimate: Estimate, series: Sequence[SampledRecording], max_iterations: int = MAX_ITERATIONS
-) -> Estimate:
+def refine(estimate: Estimate, series: Sequence[SampledRecording]) -> Estimate:
     """Return a converged fit: new difference Jacobians alternate with damped steps.
 
     It ends when the steps after a new Jacobian gain less than `MIN_GAIN_NEW_JACOBIAN` (1 nat), or
-    after `MAX_REFINEMENTS` (12). Steps end at a gain below `MIN_GAIN` or after `max_iterations`.
+    after `MAX_REFINEMENTS` (12). Steps end at a gain below `MIN_GAIN` or after `MAX_ITERATIONS`.
     The result has normal equations. An estimate with infinite cost is returned unchanged.
     """
     if not _is_finite(estimate):
         return estimate
     for _ in range(MAX_REFINEMENTS):
         estimate = with_normal_equations(estimate, series)
-        further = _iterate_steps(estimate, series, max_iterations, min_gain=MIN_GAIN)
+        further = _iterate_steps(estimate, series, MAX_ITERATIONS, min_gain=MIN_GAIN)
         if estimate.cost - further.estimate.cost < MIN_GAIN_NEW_JACOBIAN:
             return further.with_jacobian(series)
         estimate = further.estimate

@@ -108,6 +108,12 @@ def test_a_tiny_gain_separates_nothing() -> None:
     assert abs(max(weights) - log_form_weight(None, 0.0)) < 1.0
 
 
+@given(parts, gains, st.integers(0, 9))
+def test_each_parameter_has_the_same_price(part: float, gain: float, count: int) -> None:
+    price = log_form_weight(part, gain) - log_form_weight(part, gain, count)
+    assert price == pytest.approx(count / 2.0 * math.log(FORM_SAMPLES))
+
+
 @given(parts, parts, gains)
 def test_an_effect_that_leaves_less_weighs_more(first: float, second: float, gain: float) -> None:
     low, high = sorted((first, second))

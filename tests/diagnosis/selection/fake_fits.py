@@ -18,7 +18,7 @@ from diagnosis.model.candidate import Candidate
 from diagnosis.model.compile_cache import CompiledModel
 from diagnosis.model.parameter import FreeParameter
 from diagnosis.model.parameter_vector import vector_of
-from diagnosis.model.placed_effect import PlacedEffect, find_placements
+from diagnosis.model.placed_effect import PlacedEffect, effect_names, find_placements
 from diagnosis.selection.candidate_search import CandidateFit
 from diagnosis.selection.comparison import Round
 from language.loading.load import automaton_of
@@ -48,19 +48,22 @@ def places_of(model_set: ModelSet, effects: Sequence[Effect], count: int) -> lis
     return found[:count]
 
 
-def candidate_of(effects: Sequence[PlacedEffect]) -> Candidate:
-    """A candidate with one free parameter of the base, and one of each effect."""
-    names = ["J", *(f"a_{one.id}" for one in effects)]
+def candidate_of(effects: Sequence[PlacedEffect], own: int = 1) -> Candidate:
+    """A candidate with one free parameter of the base, and at most `own` of each effect."""
+    names = ["J", *(name for one in effects for name in sorted(effect_names(one))[:own])]
     free = tuple(FreeParameter(name, 1.0, 0.1, 9.0, 1.0, False) for name in names)
     columns = PredictorColumns("spinner", (), (), (), (), (), {})
     return Candidate(tuple(effects), CompiledModel(columns, 1, (), free, (), ()), NOTHING)
 
 
 def fit_of(
-    effects: Sequence[PlacedEffect], cost: float, variances: Sequence[float] = (1.0,)
+    effects: Sequence[PlacedEffect],
+    cost: float,
+    variances: Sequence[float] = (1.0,),
+    own: int = 1,
 ) -> Estimate:
     """A fit with white innovations of these variances."""
-    candidate = candidate_of(effects)
+    candidate = candidate_of(effects, own)
     random = np.random.default_rng(1)
     prediction = SimpleNamespace(
         variances=np.array(variances),

@@ -9,12 +9,12 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from diagnosis.criterion.explained_share import MAX_ORDINARY_ENERGY, MIN_SHARE
+from diagnosis.criterion.explained_share import FORM_SAMPLES, MAX_ORDINARY_ENERGY, MIN_SHARE
 from diagnosis.criterion.threshold import DEFAULT_THRESHOLD, Thresholds
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.model_set import ModelSet, balance_disturbances
-from diagnosis.model.placed_effect import PlacedEffect, shipped_effects
+from diagnosis.model.placed_effect import PlacedEffect, effect_names, shipped_effects
 from diagnosis.selection import forward_selection
 from diagnosis.selection.comparison import Round, compare_candidates, effective_gain
 from diagnosis.selection.forward_selection import (
@@ -220,6 +220,18 @@ def test_an_unfitted_candidate_has_no_probability(places: list[PlacedEffect]) ->
     assert probabilities.keys() == {places[0].id, "other"}
     assert sum(probabilities.values()) == pytest.approx(1.0)
     assert candidate_probabilities(round_of(base, [])) == {"other": 1.0}
+
+
+def test_of_two_effects_that_explain_the_same_the_one_with_fewer_parameters_is_more_probable(
+    places: list[PlacedEffect],
+) -> None:
+    base = fit_of((), COST, [11.0])
+    one, other = next(pair for pair in [places[:2], places[2:4]] if len(effect_names(pair[1])) > 1)
+    simple, long = (tried(base, effect, GAIN, 0.9) for effect in (one, other))
+    long = dataclasses.replace(long, estimate=fit_of([other], long.cost, [2.0], own=2))
+    probabilities = candidate_probabilities(round_of(base, [long, simple]))
+    ratio = probabilities[one.id] / probabilities[other.id]
+    assert ratio == pytest.approx(np.sqrt(FORM_SAMPLES))
 
 
 def test_the_tolerated_energy_is_the_error_of_the_form_or_an_ordinary_one() -> None:
