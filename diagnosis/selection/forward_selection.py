@@ -6,13 +6,17 @@ The base of the next comparison contains the accepted effects (docs/method.md).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from diagnosis.criterion.explained_share import (
     FORM_ERROR,
     MAX_ORDINARY_ENERGY,
     MIN_SHARE,
     explained_share,
+    is_ordinary,
     log_form_weight,
 )
 from diagnosis.criterion.threshold import DEFAULT_THRESHOLDS, Thresholds
@@ -22,6 +26,7 @@ from diagnosis.model.placed_effect import effect_names
 from diagnosis.selection.candidate_search import CandidateFit
 from diagnosis.selection.comparison import Round, compare_candidates
 from diagnosis.selection.intersample import LogCallback
+from diagnosis.validation.free_simulation import nrmse
 
 MAX_EFFECTS = 3
 """Largest number of accepted effects."""
@@ -95,14 +100,14 @@ def select_effects(
     """
     first = compare_candidates(model_set, base, model_set.applicable_effects(), log)
     found = Selection(base, base, (), first, first)
-    best = _best_candidate(first, thresholds)
+    best = _best_candidate(model_set, first, thresholds)
     if best is None:
         return found
     if best.share < MIN_SHARE:
         return _select_pair(model_set, found, best, thresholds, log)
     found = _accept(model_set, found, best, log)
     while len(found.accepted) < MAX_EFFECTS:
-        best = _best_candidate(found.last, thresholds)
+        best = _best_candidate(model_set, found.last, thresholds)
         if best is None or best.share < MIN_SHARE:
             break
         found = _accept(model_set, found, best, log)
@@ -116,12 +121,44 @@ def tolerated_energy(first: Round) -> float:
     return min(FORM_ERROR**2 * first.energy, MAX_ORDINARY_ENERGY * len(first.floor))
 
 
-def _best_candidate(compared: Round, thresholds: Thresholds) -> CandidateFit | None:
-    """Return the candidate with the largest gain, None if it does not gain its threshold."""
-    best = next(iter(compared.candidates), None)
-    if best is None or best.gain < thresholds.threshold_of(best.placed_effect):
-        return None
-    return best
+def _best_candidate(
+    model_set: ModelSet, compared: Round, thresholds: Thresholds
+) -> CandidateFit | None:
+    """Return the candidate with the largest gain, None if it does not gain its threshold.
+
+    Of the candidates that explain enough, the first one is taken that also explains enough of what
+    is wrong in free simulations (`simulated_shares`).
+    """
+    enough = [
+        one for one in compared.candidates if one.gain >= thresholds.threshold_of(one.placed_effect)
+    ]
+    explaining = [one for one in enough if one.share >= MIN_SHARE]
+    if not explaining:
+        return next(iter(enough), None)
+    shares = simulated_shares(model_set, compared.base, explaining)
+    pairs = zip(explaining, shares, strict=True)
+    return next((one for one, share in pairs if share >= MIN_SHARE), explaining[0])
+
+
+def simulated_shares(
+    model_set: ModelSet, base: Estimate, candidates: Sequence[CandidateFit]
+) -> list[float]:
+    """Return the share of the error of free simulation that each candidate explains.
+
+    The error of the best of these models, channel by channel, is what nothing explains. All shares
+    are 1 if the base exceeds it by no more than an ordinary disturbance.
+    """
+    errors = [nrmse(one, model_set.series) ** 2 for one in _estimates(base, candidates)]
+    floor = np.maximum(np.min(errors, axis=0), np.finfo(float).tiny)
+    before, *after = [float(np.sum(error / floor - 1.0)) for error in errors]
+    if is_ordinary(before, len(floor)):
+        return [1.0] * len(after)
+    return [1.0 - remaining / before for remaining in after]
+
+
+def _estimates(base: Estimate, candidates: Sequence[CandidateFit]) -> list[Estimate]:
+    """Return the base and the fits of fitted candidates."""
+    return [base, *(one.estimate for one in candidates if one.estimate is not None)]
 
 
 def _accept(
@@ -148,7 +185,7 @@ def _select_pair(
 ) -> Selection:
     """Return the selection with two effects that together explain most; else without any."""
     pair = _accept(model_set, found, best, log)
-    second = _best_candidate(pair.last, thresholds)
+    second = _best_candidate(model_set, pair.last, thresholds)
     if second is not None and second.share >= MIN_SHARE:
         return _accept(model_set, pair, second, log)
     log(f"not accepted {best.placed_effect.id}: it explains {100 * best.share:.0f} %")

@@ -32,9 +32,13 @@ SAMPLES = 1000.0
 NOTHING = cast(Any, None)
 
 
-def rotor_model_set(effects: Sequence[Effect] = ()) -> ModelSet:
+FRICTION = "0.1 N*m*s/rad, range: [0.01, 0.5]"
+"""The viscous friction of the rotor in its spec."""
+
+
+def rotor_model_set(effects: Sequence[Effect] = (), friction: str = FRICTION) -> ModelSet:
     """The rotor without recordings."""
-    text = SPEC.replace("recording_map: bench_columns\n", "")
+    text = SPEC.replace("recording_map: bench_columns\n", "").replace(FRICTION, friction)
     document = parse_document(Source("spinner.yaml", tuple(text.splitlines())), text)
     project = Project(Path())
     automaton = automaton_of(document, project)
