@@ -1,4 +1,4 @@
-"""Output error: a rotor whose initial speed is soon forgotten is simulated over whole recordings."""
+"""Output error: a rotor that soon forgets its initial speed is simulated as a whole."""
 
 from __future__ import annotations
 
