@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,7 +134,7 @@ def sample_recording(
         [output_channels[name] for name in output_names if name in output_channels], used
     )
     step = period or min(grid_period(channel.times) for channel in used)
-    count = int((end - start) / step) + 1
+    count = int((end - start) / step + MAX_SLIP) + 1
     if count < 2:
         raise ValueError(f"{recording.name}: only {count} samples in common")
     input_values = np.stack(
@@ -258,8 +259,12 @@ def grid_period(times: Sequence[Fraction]) -> Fraction:
 
     The median difference tells how many periods lie between neighbouring stamps, so that gaps and
     jitter do not count; the period is the duration over their sum. The result is the simplest
-    fraction with which the last stamp moves by at most `MAX_SLIP` (a tenth) of a period.
+    fraction with which the last stamp moves by at most `MAX_SLIP` (a tenth) of a period. Stamps
+    that are uniform have their exact period.
     """
+    first = times[1] - times[0]
+    if all(late - early == first for early, late in pairwise(times)):
+        return first
     seconds = np.array([float(time) for time in times])
     differences = np.diff(seconds)
     usual = float(np.median(differences))

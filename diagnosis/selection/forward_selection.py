@@ -26,7 +26,7 @@ from diagnosis.model.placed_effect import effect_names
 from diagnosis.selection.candidate_search import CandidateFit
 from diagnosis.selection.comparison import Round, compare_candidates
 from diagnosis.selection.intersample import LogCallback
-from diagnosis.validation.free_simulation import nrmse
+from diagnosis.validation.free_simulation import complete_nrmse
 
 MAX_EFFECTS = 3
 """Largest number of accepted effects."""
@@ -146,14 +146,18 @@ def simulated_shares(
     """Return the share of the error of free simulation that each candidate explains.
 
     The error of the best of these models, channel by channel, is what nothing explains. All shares
-    are 1 if the base exceeds it by no more than an ordinary disturbance.
+    are 1 if the base exceeds it by no more than an ordinary disturbance, or if all simulations
+    diverge; a candidate whose simulation diverges explains nothing.
     """
-    errors = [nrmse(one, model_set.series) ** 2 for one in _estimates(base, candidates)]
-    floor = np.maximum(np.min(errors, axis=0), np.finfo(float).tiny)
+    errors = [complete_nrmse(one, model_set.series) ** 2 for one in _estimates(base, candidates)]
+    finite = [error for error in errors if np.all(np.isfinite(error))]
+    if not finite:
+        return [1.0] * (len(errors) - 1)
+    floor = np.maximum(np.min(finite, axis=0), np.finfo(float).tiny)
     before, *after = [float(np.sum(error / floor - 1.0)) for error in errors]
     if is_ordinary(before, len(floor)):
         return [1.0] * len(after)
-    return [1.0 - remaining / before for remaining in after]
+    return [1.0 - remaining / before if np.isfinite(remaining) else -np.inf for remaining in after]
 
 
 def _estimates(base: Estimate, candidates: Sequence[CandidateFit]) -> list[Estimate]:

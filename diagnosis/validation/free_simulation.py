@@ -48,8 +48,20 @@ def nrmse(model: Estimate, series: Sequence[SampledRecording]) -> Reals:
     output-error criterion all after the burn-in. Values of a run that diverged do not count; an
     output without values has 0.
     """
+    return _nrmse_of(model, series, simulate_free(model, series))
+
+
+def complete_nrmse(model: Estimate, series: Sequence[SampledRecording]) -> Reals:
+    """Return `nrmse`, infinite for each output of a model of which a run diverges (outputs,)."""
+    runs = simulate_free(model, series)
+    size = _nrmse_of(model, series, runs)
+    return size if all(np.all(np.isfinite(run)) for run in runs) else np.full_like(size, np.inf)
+
+
+def _nrmse_of(model: Estimate, series: Sequence[SampledRecording], runs: Sequence[Reals]) -> Reals:
+    """Return the `nrmse` of simulated outputs, (samples, outputs) of each recording."""
     squares, counts = [], []
-    for one, simulated in zip(series, simulate_free(model, series), strict=True):
+    for one, simulated in zip(series, runs, strict=True):
         counted = is_after_burn_in(one) if model.noise_levels.is_output_error else is_free(one)
         alone = counted[:, None] & np.isfinite(one.measured) & np.isfinite(simulated)
         error = np.where(alone, one.measured - simulated, 0.0)

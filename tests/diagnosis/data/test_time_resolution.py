@@ -16,16 +16,19 @@ from diagnosis.data.sampled_recording import (
     decimate,
     grid_period,
     require_equal_periods,
+    sample_recording,
     share_period,
     simplest_fraction,
 )
 from diagnosis.data.time_resolution import SHORTEST_STEP, STEP_RATE_PRODUCT, time_resolution
+from engine.recordings.recording import Channel, Recording
 from language.loading.load import automaton_of
 from language.model.automaton import Automaton
 from language.overlays.expand_document import Project
 from language.text.diagnostic import Source
 from language.text.project_files import parse_document
 from tests.diagnosis.rotor_project import SPEC
+from tests.diagnosis.small_driveline import read_recording_map
 
 LONGEST = Fraction(5, 1000)
 TWO_MODES = """\
@@ -113,8 +116,22 @@ def test_the_period_is_exact_with_gaps_and_jitter() -> None:
     assert grid_period(moved) == Fraction(1, 100)
 
 
-def test_two_stamps_are_one_period_apart() -> None:
-    assert grid_period([Fraction(1), Fraction(3, 2)]) == Fraction(1, 2)
+@pytest.mark.parametrize("count", [2, 3, 10, 1000])
+def test_uniform_stamps_have_their_exact_period(count: int) -> None:
+    """However few they are."""
+    for period in (Fraction(1, 2), Fraction(1, 1000), Fraction(977, 10**6)):
+        assert grid_period([1 + k * period for k in range(count)]) == period
+
+
+def test_the_last_sample_counts_although_stamps_are_rounded() -> None:
+    columns = read_recording_map().columns
+    for count in (3, 50, 3000):
+        times = tuple(stamps(Fraction(1, 3), count, 2))
+        values = tuple(float(k) for k in range(count))
+        channels = {key: Channel(columns[key], times, values) for key in ("torque", "motor")}
+        whole = Recording("a", channels, times[-1], times[0])
+        one = sample_recording(whole, ["T_em"], ["w_em"], {})
+        assert one.measured[:, 0].tolist() == one.inputs[:, 0].tolist() == list(values)
 
 
 @given(st.fractions(Fraction(1, 2000), Fraction(2), max_denominator=2000), st.integers(2, 400))

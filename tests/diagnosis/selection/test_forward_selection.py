@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
 
@@ -16,12 +17,14 @@ from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.model_set import ModelSet, balance_disturbances
 from diagnosis.model.placed_effect import PlacedEffect, effect_names, shipped_effects
 from diagnosis.selection import forward_selection
+from diagnosis.selection.candidate_search import CandidateFit
 from diagnosis.selection.comparison import Round, compare_candidates, effective_gain
 from diagnosis.selection.forward_selection import (
     MAX_EFFECTS,
     Selection,
     candidate_probabilities,
     select_effects,
+    simulated_shares,
     tolerated_energy,
 )
 from diagnosis.selection.intersample import fit_base
@@ -126,15 +129,23 @@ def select(
     monkeypatch: pytest.MonkeyPatch,
     rounds: Sequence[Rounds],
     thresholds: Thresholds | None = None,
+    simulated: Sequence[float] = (1.0, 1.0, 1.0),
 ) -> tuple[Selection, list[str]]:
-    """The selection from one comparison after the other; asking for more of them is an error."""
+    """The selection from one comparison after the other; asking for more of them is an error.
+
+    `simulated` are the shares of the error of free simulation of candidates that explain enough.
+    """
     given: Iterator[Rounds] = iter(rounds)
     lines: list[str] = []
 
     def compare(_: ModelSet, base: Estimate, __: Iterable[PlacedEffect], *___: object) -> Round:
         return next(given)(base)
 
+    def share(_: ModelSet, __: Estimate, candidates: Sequence[CandidateFit]) -> list[float]:
+        return list(simulated[: len(candidates)])
+
     monkeypatch.setattr(forward_selection, "compare_candidates", compare)
+    monkeypatch.setattr(forward_selection, "simulated_shares", share)
     found = select_effects(
         rotor_model_set(), fit_of((), COST, [11.0]), thresholds or Thresholds(), lines.append
     )
@@ -189,12 +200,49 @@ def test_at_most_so_many_effects_are_accepted(
     assert [one.placed_effect for one in found.accepted] == places[:MAX_EFFECTS]
 
 
-def test_the_candidate_of_largest_gain_is_taken_whatever_others_explain(
-    monkeypatch: pytest.MonkeyPatch, places: list[PlacedEffect]
+@pytest.mark.parametrize(
+    ("shares", "simulated", "taken"),
+    [
+        ((0.8, 0.95), (1.0, 1.0), 0),  # the largest gain
+        ((0.5, 0.95), (1.0,), 1),  # the first one explains too little
+        ((0.8, 0.95), (0.5, 0.9), 1),  # it does not simulate well
+        ((0.8, 0.95), (0.5, 0.6), 0),  # none does
+    ],
+)
+def test_the_first_candidate_that_explains_enough_is_taken(
+    shares: tuple[float, float],
+    simulated: tuple[float, ...],
+    taken: int,
+    monkeypatch: pytest.MonkeyPatch,
+    places: list[PlacedEffect],
 ) -> None:
-    rounds = [beside((places[0], GAIN + 1.0, 0.8), (places[1], GAIN, 0.95)), beside()]
-    found, _ = select(monkeypatch, rounds)
-    assert [one.placed_effect for one in found.accepted] == places[:1]
+    first = beside((places[0], GAIN + 1.0, shares[0]), (places[1], GAIN, shares[1]))
+    found, _ = select(monkeypatch, [first, beside()], simulated=simulated)
+    assert [one.placed_effect for one in found.accepted] == [places[taken]]
+
+
+@pytest.mark.parametrize(
+    ("errors", "expected"),
+    [
+        (((3.0, 1.0), (1.0, 1.0), (2.0, 1.0)), [1.0, 0.625]),
+        (((1.5, 1.0), (1.0, 1.0), (2.0, 1.0)), [1.0, 1.0]),  # the base leaves an ordinary error
+        (((3.0, 1.0), (math.inf, math.inf), (1.0, 1.0)), [-math.inf, 1.0]),
+        (((math.inf, math.inf), (math.inf, math.inf), (1.0, 1.0)), [-math.inf, 1.0]),
+        (((math.inf, math.inf),) * 3, [1.0, 1.0]),
+    ],
+)
+def test_shares_of_simulation_errors_are_relative_to_the_best_simulation(
+    errors: tuple[tuple[float, float], ...],
+    expected: list[float],
+    monkeypatch: pytest.MonkeyPatch,
+    places: list[PlacedEffect],
+) -> None:
+    base = fit_of((), COST, [1.0, 1.0])
+    candidates = [tried(base, one, GAIN, 0.9) for one in places[:2]]
+    models = [base, *(one.estimate for one in candidates)]
+    sizes = {id(model): np.array(error) for model, error in zip(models, errors, strict=True)}
+    monkeypatch.setattr(forward_selection, "complete_nrmse", lambda model, _: sizes[id(model)])
+    assert simulated_shares(rotor_model_set(), base, candidates) == pytest.approx(expected)
 
 
 def test_rivals_are_the_candidates_of_the_smallest_probable_set(
