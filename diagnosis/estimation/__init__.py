@@ -1,1 +1,1 @@
-"""Estimation of parameters and noise from recordings by the innovations likelihood."""
+"""Estimation of parameters from recordings by the innovations likelihood."""

@@ -1,1 +1,1 @@
-"""The whole procedure: usable recordings, calibration, selection, decision, validation."""
+"""The whole procedure: usable recordings, recalibration, selection, decision, validation."""

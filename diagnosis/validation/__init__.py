@@ -1,1 +1,1 @@
-"""Validation of a diagnosis: residual autocorrelation, constancy, free simulation."""
+"""Validation of a diagnosis: residual autocorrelation, free simulation, oscillation."""
