@@ -197,15 +197,16 @@ def _select_pair(
 
 
 def _rivals(compared: Round, accepted: CandidateFit) -> tuple[CandidateFit, ...]:
-    """Return the candidates that belong to the smallest set of `SET_PROBABILITY` (0.95)."""
+    """Return the candidates besides the accepted one that belong to the smallest set of hypotheses
+    with a probability of `SET_PROBABILITY` (0.95); `other` counts as a hypothesis.
+    """
+    fits = {one.placed_effect.id: one for one in compared.candidates}
     probabilities = candidate_probabilities(compared)
-    fitted = [one for one in compared.candidates if one.is_fitted]
-    fitted.sort(key=lambda one: -probabilities[one.placed_effect.id])
     rivals, total = [], 0.0
-    for one in fitted:
+    for name, probability in sorted(probabilities.items(), key=lambda item: -item[1]):
         if total >= SET_PROBABILITY:
             break
-        total += probabilities[one.placed_effect.id]
-        if one.placed_effect.id != accepted.placed_effect.id:
-            rivals.append(one)
+        total += probability
+        if name in fits and name != accepted.placed_effect.id:
+            rivals.append(fits[name])
     return tuple(rivals)
