@@ -17,6 +17,7 @@ from diagnosis.localisation.cause import attribute_causes, balance_of, is_inacti
 from diagnosis.localisation.disturbance_state_fit import free_disturbance
 from diagnosis.localisation.location import Location, location_of, with_smoothed_disturbances
 from diagnosis.model.placed_effect import PlacedEffect, disturbance_effect
+from language.text.diagnostic import SpecError
 from language.text.document import MappingNode
 
 
@@ -30,7 +31,7 @@ def localise(model_set: ModelSet, base: Estimate) -> tuple[Location, ...]:
     """
     free = [
         (section, placed_effect, free_disturbance(model_set, base, placed_effect))
-        for section, placed_effect in disturbance_locations(model_set)
+        for section, placed_effect in disturbance_locations(model_set, base)
     ]
     restricted_cost = free_disturbance(model_set, base).cost
     finite_costs = [one.cost for *_, one in free if np.isfinite(one.cost)]
@@ -46,11 +47,12 @@ def localise(model_set: ModelSet, base: Estimate) -> tuple[Location, ...]:
     return tuple([with_smoothed_disturbances(model_set, ranked[0]), *ranked[1:]] if ranked else [])
 
 
-def disturbance_locations(model_set: ModelSet) -> list[tuple[str, PlacedEffect]]:
-    """Return section and disturbance of each place where a disturbance is tried.
+def disturbance_locations(model_set: ModelSet, base: Estimate) -> list[tuple[str, PlacedEffect]]:
+    """Return section and disturbance of each place where a disturbance is tried beside a base.
 
     These are the balances that have one in the model set ("flow"), then the elastic elements
-    ("elements"), then the compared outputs ("outputs").
+    ("elements"), then the compared outputs ("outputs"). A place at which the effects of the base
+    leave no room for a disturbance, such as an output with a delay, is left out.
     """
     locations = [("flow", placed_effect) for placed_effect in model_set.disturbances]
     elements = model_set.document.root.get("elements")
@@ -60,7 +62,23 @@ def disturbance_locations(model_set: ModelSet) -> list[tuple[str, PlacedEffect]]
     locations += [
         ("outputs", disturbance_effect("output", name)) for name in model_set.output_names
     ]
-    return locations
+    effects = base.candidate.placed_effects
+    return [
+        (section, one)
+        for section, one in locations
+        if section == "flow" or _can_combine(model_set, effects, one)
+    ]
+
+
+def _can_combine(
+    model_set: ModelSet, effects: Sequence[PlacedEffect], disturbance: PlacedEffect
+) -> bool:
+    """Return whether a model with effects can have an additional disturbance."""
+    try:
+        model_set.compile_candidate(effects, (*model_set.disturbances, disturbance))
+    except SpecError:
+        return False
+    return True
 
 
 def rank_accepted_first(

@@ -73,7 +73,7 @@ def compare_candidates(
     of the signals is the floor.
     """
     is_simulated = base.noise_levels.is_output_error
-    places = () if is_simulated else disturbance_locations(model_set)
+    places = () if is_simulated else disturbance_locations(model_set, base)
     free = {
         f"{section}.{one.place}": free_disturbance(model_set, base, one) for section, one in places
     }
