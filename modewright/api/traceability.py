@@ -31,6 +31,8 @@ from language.text.document import Document, ScalarNode, read_text
 from language.text.node_edit import find_node, mapping_entries
 from modewright.api.spec_tests import find_tests, load_tests, run_test
 
+SHARED_FILES = ("ha_math", "ha_page")
+"""Begins of the names of C files that all automata share."""
 HEADINGS = ("name", "id", "requirement")
 """First cells, in lower case, that mark a row as headings."""
 
@@ -80,8 +82,8 @@ def trace_keys(specs: PathTexts, root: PathText | None = None) -> KeyTraceReport
     """Return the lines of C that come from each key of the specs.
 
     A system includes the automata of its instances and their models; an automaton alone only its
-    own C. The texts of ha_math are left out of `code`. Raises SpecError, and ValueError without a
-    spec.
+    own C. The texts of SHARED_FILES are left out of `code`. Raises SpecError, and ValueError
+    without a spec.
     """
     project, references = to_project(root), to_some_texts(specs, "specs")
     documents = _load_documents(references, project)
@@ -93,7 +95,7 @@ def trace_keys(specs: PathTexts, root: PathText | None = None) -> KeyTraceReport
     found = build_key_traces(expanded_documents, code)
     files = dict.fromkeys(key.place.source.name for key in found.keys)
     every = {name: text for files in code.values() for name, text in files.items()}
-    shown = {name: text for name, text in every.items() if not name.startswith("ha_math")}
+    shown = {name: text for name, text in every.items() if not name.startswith(SHARED_FILES)}
     return KeyTraceReport(found, {name: read_text(Path(name))[1] for name in files}, shown)
 
 
