@@ -149,8 +149,8 @@ class RangeAnalysis:
                 return image_of_corners(left, right, lambda a, b: a * b)
         if right.contains_zero and self.report:
             self.report("divisor", tree.right, right)
-        if right.low <= 0.0 <= right.high:
-            return UNBOUNDED
+        if right.low <= 0.0 <= right.high or 0.0 in (right.low, right.high):
+            return UNBOUNDED  # an empty interval of an alternative that is never taken may end at 0
         return image_of_corners(left, right, lambda a, b: a / b)
 
     def _power(self, tree: Power, base: Interval, exponent: int) -> Interval:

@@ -84,6 +84,14 @@ def test_a_power_that_underflows_gives_no_bound() -> None:
     assert (found.low, found.high) == (-math.inf, -1.0)
 
 
+def test_a_divisor_without_values_that_ends_at_zero_gives_no_bound() -> None:
+    """Where a condition is never true, the lower bound is above the upper one."""
+    ranges = {"a": Interval(-5.0, 0.0, True)}
+    analysis = RangeAnalysis(ranges.__getitem__, lambda name: UNBOUNDED)
+    assert analysis.analyse(tree("if a > 3 then 1 / a else 2")).high >= 2.0
+    assert analysis.analyse(tree("if a > 3 then a^-3 else 2")).high >= 2.0
+
+
 @pytest.mark.parametrize(
     ("text", "low", "high"),
     [
