@@ -79,7 +79,7 @@ class Project:
         for path, kind, name in self._heads:
             if is_wanted(kind):
                 own.setdefault(name, []).append(path)
-        shipped = Path(str(resources.files("spec")))
+        shipped = shipped_folder()
         if shipped.resolve() != (self.root / "spec").resolve():
             for path, kind, name in _shipped_heads(shipped):
                 if is_wanted(kind):
@@ -146,6 +146,16 @@ class Project:
                 hint = suggest_name(reference, index) or "a name of a spec below spec/, or a path"
             problems.error("name", place, f"there is no {what} named `{reference}`", hint)
         raise SpecError(problems.reported)
+
+
+def shipped_folder() -> Path:
+    """Return the folder of the specs of the distribution."""
+    return Path(str(resources.files("spec")))
+
+
+def is_shipped(path: Path) -> bool:
+    """Return whether a file is a spec of the distribution."""
+    return path.resolve().is_relative_to(shipped_folder().resolve())
 
 
 def display_path(path: Path) -> str:

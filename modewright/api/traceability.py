@@ -47,8 +47,8 @@ def trace(
     """Return the requirements that specs, their C and the tests of the project name.
 
     A system includes the automata of its instances and their models. Only tests that run one of
-    these specs count. `listed` is a CSV file of requirements with texts, which come first and are
-    included if nothing names them. With `run` the tests are run on engine and C; else they have no
+    these specs count; for specs of the distribution its tests count, too.
+    `listed` is a CSV file of requirements with texts, which come first and are included if nothing names them. With `run` the tests are run on engine and C; else they have no
     verdicts. Raises SpecError, MissingToolError, and ValueError without a spec.
     """
     project, requirements = to_project(root), optional(to_path, listed, "listed")
@@ -59,9 +59,8 @@ def trace(
         for document in documents
         for name in (document.name, *_instance_types(document, project))
     }
-    tests = [
-        test for test in load_tests(find_tests(root), root) if names & _tested_names(test, project)
-    ]
+    files = find_tests(root, [Path(document.source.name) for document in documents])
+    tests = [test for test in load_tests(files, root) if names & _tested_names(test, project)]
     verdicts = [_run_expectations(test) if run else {} for test in tests]
     code = _generate_code(documents, project)
     return trace_requirements(
