@@ -169,8 +169,8 @@ class _MapReader(Reader):
         return ColumnMapping(
             name=entry.key,
             columns=tuple(names),
-            to=self.read_string(to, "to", entry.span) if to else None,
-            compare=self.read_string(compare, "compare", entry.span) if compare else None,
+            to=self.read_reference(to, "to") if to else None,
+            compare=self.read_reference(compare, "compare") if compare else None,
             unit=self.read_unit(table.get("unit")),
             scale=self._read_scale(table),
             sign=int(self.read_choice(table.get("sign"), "sign", ("1", "-1"), "1")),

@@ -127,6 +127,16 @@ class Reader:
         scalar = self.read_scalar(node, what, span)
         return scalar.text if scalar else ""
 
+    def read_reference(self, node: YamlNode, what: str) -> str:
+        """Return the text of a scalar that names something; "" with a problem reported otherwise.
+
+        Reported are a node that is no scalar, and an empty text. `what` names the node.
+        """
+        text = self.read_string(node, what, node.span)
+        if isinstance(node, ScalarNode) and not text:
+            self.problems.error("missing", node.span, f"`{what}` has no name")
+        return text
+
     def read_alternative(
         self, entry: Entry, key: str, alternatives: Mapping[str, tuple[str, ...]], verb: str
     ) -> tuple[str, MappingNode] | None:
