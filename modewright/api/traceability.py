@@ -47,9 +47,10 @@ def trace(
     """Return the requirements that specs, their C and the tests of the project name.
 
     A system includes the automata of its instances and their models. Only tests that run one of
-    these specs count; for specs of the distribution its tests count, too.
-    `listed` is a CSV file of requirements with texts, which come first and are included if nothing
-    names them. With `run` the tests are run on engine and C; else they have no verdicts. Raises SpecError, MissingToolError, and ValueError without a spec.
+    these specs count; for specs of the distribution its tests count, too. `listed` is
+    a CSV file of requirements with texts, which come first and are included if nothing names them.
+    With `run` the tests are run on engine and C; else they have no verdicts. Raises
+    SpecError, MissingToolError, and ValueError without a spec.
     """
     project, requirements = to_project(root), optional(to_path, listed, "listed")
     documents = _load_documents(to_some_texts(specs, "specs"), project)
