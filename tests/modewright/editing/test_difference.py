@@ -186,6 +186,12 @@ def test_a_spec_is_compared_with_what_it_was_in_a_revision(
     assert same.exit_code == 0
     refused = CliRunner().invoke(app, ["diff", "nowhere:more", "more"])
     assert "Git has no `nowhere` here" in str(refused.exception)
+    written = tmp_path / "written"
+    for option in (f"--output={written}", "--remote=.", "-o", "--"):
+        refused = CliRunner().invoke(app, ["diff", "--", f"{option}:more", "more"])
+        assert isinstance(refused.exception, SpecError)
+        assert f"`{option}` is no revision of Git" in str(refused.exception)
+    assert not written.exists()
 
 
 def test_without_git_a_revision_is_answered_with_the_line_that_installs_it(
