@@ -162,6 +162,17 @@ def test_a_title_is_a_text(run: mw.Trajectory, title: object) -> None:
         mw.plot(run, title=title)  # type: ignore[arg-type]
 
 
+def test_a_scenario_of_another_system_is_named_with_its_system(folder: Path) -> None:
+    with pytest.raises(SpecError) as caught:
+        mw.simulate("warm_room", "tip_out", root=folder)
+    (problem,) = caught.value.problems
+    label = "`tip_out` is a scenario of `ev_driveline`, not of `warm_room`"
+    assert (problem.kind, problem.label) == ("form", label)
+    assert problem.help == (
+        "with `warm_room`: `plant.w_w` is not a state of an instance of `warm_room`"
+    )
+
+
 def test_an_instance_without_events_has_none(run: mw.Trajectory) -> None:
     quiet = simulated(T_low="0 degC")
     assert quiet.events_of("thermostat") == ()
