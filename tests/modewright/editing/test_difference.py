@@ -156,7 +156,7 @@ def test_parameters_of_the_model_are_compared_with_what_is_laid_over_them() -> N
 def test_the_exit_code_says_whether_something_differs_where_it_is_asked_for() -> None:
     run = CliRunner().invoke
     assert run(app, ["diff", "driveline", "driveline", "--exit-code"]).exit_code == 0
-    assert run(app, ["diff", "driveline", "driveline"]).output == ""
+    assert run(app, ["diff", "driveline", "driveline"]).output == "no differences\n"
     assert run(app, ["diff", "driveline", "driveline_load"]).exit_code == 0
     assert run(app, ["diff", "driveline", "driveline_load", "--exit-code"]).exit_code == 1
 
