@@ -23,7 +23,7 @@ from language.expressions.syntax_tree import (
 )
 from language.expressions.units import parse_unit
 from language.model.automaton import Automaton
-from language.model.declaration import Formula
+from language.model.declaration import Formula, Input, State
 from language.model.used_names import formulas_of
 from language.text.diagnostic import Problems
 
@@ -56,7 +56,8 @@ def _temperatures(automaton: Automaton) -> Iterator[str]:
     for name, parameter in automaton.parameters.items():
         if parameter.unit.offset:
             yield name
-    for name, variable in (*automaton.inputs.items(), *automaton.state_variables.items()):
+    variables: dict[str, Input | State] = {**automaton.inputs, **automaton.state_variables}
+    for name, variable in variables.items():
         low = variable.range[0] if variable.range else 0
         is_high = variable.unit.dimension == KELVIN and low >= ABSOLUTE_TEMPERATURE
         if variable.unit.offset or is_high:

@@ -106,5 +106,5 @@ def test_an_identifier_that_is_no_number_is_wrong_usage(capsys: pytest.CaptureFi
 
 def test_a_dependency_of_several_extras_is_checked_once(monkeypatch: pytest.MonkeyPatch) -> None:
     lines = ["pyarrow>=1; extra == 'a'", "numpy", "pyarrow>=1; extra == 'b'"]
-    monkeypatch.setattr(doctor.metadata, "requires", lambda name: lines)
+    monkeypatch.setattr(metadata, "requires", lambda name: lines)
     assert [check.name for check in doctor._check_dependencies()] == ["pyarrow", "numpy"]
