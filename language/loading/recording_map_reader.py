@@ -98,7 +98,10 @@ class _MapReader(Reader):
 
     def _read_databases(self, node: YamlNode | None) -> tuple[ScalarNode, ...]:
         """Return the names of DBC files: a single one or a list."""
-        return (node,) if isinstance(node, ScalarNode) else tuple(self.read_list(node, "dbc"))
+        names = (node,) if isinstance(node, ScalarNode) else tuple(self.read_list(node, "dbc"))
+        for name in names:
+            self.check_file_name(name.text, name.span, "dbc")
+        return names
 
     def _read_windows(self, node: YamlNode | None) -> dict[str, tuple[Window, ...]]:
         """Return the windows by file name; a bare list applies to all files."""
@@ -106,6 +109,8 @@ class _MapReader(Reader):
             return {}
         if not isinstance(node, MappingNode):
             return {ALL_FILES: self._read_window_list(node)}
+        for entry in node:
+            self.check_file_name(entry.key, entry.span, "windows")
         return {entry.key: self._read_window_list(entry.node) for entry in node}
 
     def _read_window_list(self, node: YamlNode) -> tuple[Window, ...]:
