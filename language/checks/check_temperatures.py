@@ -6,7 +6,7 @@ such temperatures and the comparison of one with a difference have no meaning.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Literal
 
 from language.expressions.syntax_tree import (
@@ -42,13 +42,34 @@ def check_temperatures(automaton: Automaton, problems: Problems) -> None:
     above ABSOLUTE_TEMPERATURE, and a state if its start value has the unit degC. A sum that is a
     factor or a dividend is accepted, because a mean value is such a sum.
     """
-    points = set(_temperatures(automaton))
-    declared_in_celsius = {name for name, one in automaton.parameters.items() if one.unit.offset}
-    check = _TemperatureCheck(points, declared_in_celsius, problems)
-    if points:
+    for named, label in _senseless_uses(automaton, ()):
+        help = f"if `{named[-1].path}` is a difference, declare it in K: 3 degC are 276.15 K"
+        problems.warning("temperature", named[-1].span, label, help)
+
+
+def parameters_used_as_differences(automaton: Automaton, in_celsius: Collection[str]) -> set[str]:
+    """Return those of the parameters `in_celsius` that `check_temperatures` would warn of.
+
+    Their values are given in degC, whatever the unit of their declaration.
+    """
+    uses = _senseless_uses(automaton, in_celsius)
+    return {one.path for named, _ in uses for one in named} & set(in_celsius)
+
+
+def _senseless_uses(
+    automaton: Automaton, in_celsius: Collection[str]
+) -> list[tuple[list[Name], str]]:
+    """Return the parameters in degC in each sum or comparison without meaning, and what it is.
+
+    `in_celsius` are further parameters in degC.
+    """
+    declared = {name for name, one in automaton.parameters.items() if one.unit.offset}
+    check = _TemperatureCheck({*_temperatures(automaton), *in_celsius}, {*declared, *in_celsius})
+    if check.in_celsius:
         for part in formulas_of(automaton):
             for tree in (part.tree,) if isinstance(part, Formula) else (part.left, part.right):
                 check.kind_of(tree)
+    return check.found
 
 
 def _temperatures(automaton: Automaton) -> Iterator[str]:
@@ -70,12 +91,12 @@ def _temperatures(automaton: Automaton) -> Iterator[str]:
 
 
 class _TemperatureCheck:
-    """Computes the kind of each part of an expression and reports the parts without meaning."""
+    """Computes the kind of each part of an expression and collects the parts without meaning."""
 
-    def __init__(self, points: set[str], in_celsius: set[str], problems: Problems) -> None:
+    def __init__(self, points: set[str], in_celsius: set[str]) -> None:
         self.points = points
         self.in_celsius = in_celsius
-        self.problems = problems
+        self.found: list[tuple[list[Name], str]] = []
 
     def kind_of(self, tree: SyntaxTree, is_scaled: bool = False) -> Kind:
         """Return the kind of a value; `is_scaled` tells that it is a factor or a dividend."""
@@ -99,14 +120,14 @@ class _TemperatureCheck:
             case Relation():
                 kinds = {self.kind_of(tree.left), self.kind_of(tree.right)}
                 if kinds == {"point", "difference"}:
-                    self._report(tree, "this compares a temperature in degC with a difference")
+                    self._collect(tree, "this compares a temperature in degC with a difference")
                 return None
         for part in children(tree):
             self.kind_of(part, is_scaled=isinstance(tree, Arithmetic))
         return None
 
     def _kind_of_sum(self, tree: Arithmetic, is_scaled: bool) -> Kind:
-        """Return the kind of a sum or a difference; report the sum of two temperatures."""
+        """Return the kind of a sum or a difference; collect the sum of two temperatures."""
         left, right = self.kind_of(tree.left, is_scaled), self.kind_of(tree.right, is_scaled)
         if left == right == "difference":
             return "difference"
@@ -116,13 +137,12 @@ class _TemperatureCheck:
             return "point" if (left, right) == ("point", "difference") else None
         if left == right == "point":
             if not is_scaled:
-                self._report(tree, "this adds two temperatures, of which one is in degC")
+                self._collect(tree, "this adds two temperatures, of which one is in degC")
             return None
         return "point" if "point" in (left, right) else None
 
-    def _report(self, tree: Arithmetic | Relation, label: str) -> None:
-        """Warn at the last parameter in degC of an expression, if it has one."""
+    def _collect(self, tree: Arithmetic | Relation, label: str) -> None:
+        """Collect the parameters in degC of an expression, if it has one."""
         named = [one for one in walk(tree) if isinstance(one, Name) and one.path in self.in_celsius]
         if named:
-            help = f"if `{named[-1].path}` is a difference, declare it in K: 3 degC are 276.15 K"
-            self.problems.warning("temperature", named[-1].span, label, help)
+            self.found.append((named, label))

@@ -7,6 +7,9 @@ from pathlib import Path
 import pytest
 
 import modewright as mw
+from language.loading.load import automaton_of, command_line_value
+from language.overlays.expand_document import Project, read_document
+from tests.language.spec_builders import problem_lines
 
 SPEC = """language: 1
 automaton: limiter
@@ -58,3 +61,27 @@ def warned_names(folder: Path, guard: str) -> list[str]:
 )
 def test_a_temperature_is_no_difference(guard: str, names: list[str], tmp_path: Path) -> None:
     assert warned_names(tmp_path, guard) == names
+
+
+@pytest.mark.parametrize(
+    ("guard", "value", "is_refused"),
+    [
+        ("T > T_set + hyst", "hyst=2 degC", True),
+        ("T < T_set - hyst", "hyst=2 degC", True),
+        ("T > T_set + hyst", "hyst=2 K", False),
+        ("T > hyst", "hyst=2 degC", False),
+        ("T > T_set + hyst", "T_set=25 degC", False),
+        ("T > T_set + bad", "bad=2 degC", False),  # as it is declared
+    ],
+)
+def test_a_new_value_in_degc_is_no_difference(
+    guard: str, value: str, is_refused: bool, tmp_path: Path
+) -> None:
+    path = tmp_path / "limiter.yaml"
+    path.write_text(SPEC.format(guard=guard))
+    name, text = value.split("=")
+    document = read_document(path)
+    values = {name: command_line_value(text, name)}
+    lines = problem_lines(lambda: automaton_of(document, Project(tmp_path), values))
+    told = f"1:{len(name) + 2} `{name}` is a difference of temperatures: 3 degC are 276.15 K"
+    assert [line for line in lines if "nowhere" not in line] == ([told] if is_refused else [])
