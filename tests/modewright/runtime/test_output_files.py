@@ -140,11 +140,15 @@ def test_commands_refuse_a_loop_of_links_in_one_line(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "loop").symlink_to("back")
     (tmp_path / "back").symlink_to("loop")
-    (tmp_path / "here.yaml").write_text("language: 1\nautomaton: here\nperiod: 1 ms\nnumbers: float64\n")
-    lines = ("schema -o loop", "dbc here.yaml -o loop/x", "a2l here.yaml -o loop")
-    lines += ("generate here.yaml -o loop", "fmu here.yaml -o loop/x.fmu", "--log-file loop schema")
-    lines += ("diff here.yaml here.yaml --html loop", "check here.yaml --sarif loop")
-    lines += ("graph here.yaml -o loop/x.svg", "simulate here.yaml -s none -o loop/x.csv")
+    (tmp_path / "here.yaml").write_text(
+        "language: 1\nautomaton: here\nperiod: 1 ms\nnumbers: float64\n"
+    )
+    lines = [
+        *("schema -o loop", "dbc here.yaml -o loop/x", "a2l here.yaml -o loop"),
+        *("generate here.yaml -o loop", "fmu here.yaml -o loop/x.fmu", "--log-file loop schema"),
+        *("diff here.yaml here.yaml --html loop", "check here.yaml --sarif loop"),
+        *("graph here.yaml -o loop/x.svg", "simulate here.yaml -s none -o loop/x.csv"),
+    ]
     for line in lines:
         with pytest.raises(OutputError, match="loop"):
             app(line.split(), standalone_mode=False)
