@@ -47,9 +47,9 @@ class CompiledModel:
     """Metadata of a compiled candidate without its library; it is stored as JSON.
 
     `columns` describes the arrays of the predictor, `substeps` is the number of major steps in a
-    sample, and `spans` (states,) are the widths of the ranges of states. `uncertain` are the free
-    parameters, `drifts` the disturbance states with their correlation times `memories` [s], and
-    `delays` the parameters that are delay times. `brought` (states,) marks states that effects add.
+    sample, and `state_ranges` (states,) are the widths of the ranges of states. The disturbance
+    states have the correlation times `memories` [s], and `delays` are the parameters that are delay
+    times. `is_effect_state` (states,) marks states that effects add.
     """
 
     columns: PredictorColumns
@@ -164,16 +164,16 @@ def _from_json(data: dict[str, Any]) -> CompiledModel:
     """Return the metadata that a JSON object of the cache holds."""
     given: dict[str, Any] = data["columns"]
     columns: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
-    uncertain = tuple(
-        FreeParameter(**{**u, "starts": tuple(u["starts"])}) for u in data["uncertain"]
+    free_parameters = tuple(
+        FreeParameter(**{**one, "starts": tuple(one["starts"])}) for one in data["free_parameters"]
     )
     return CompiledModel(
         PredictorColumns(**columns),
         int(data["substeps"]),
-        tuple(data["spans"]),
-        uncertain,
-        tuple(data["drifts"]),
+        tuple(data["state_ranges"]),
+        free_parameters,
+        tuple(data["disturbance_states"]),
         tuple(data["memories"]),
         tuple(data["delays"]),
-        tuple(data["brought"]),
+        tuple(data["is_effect_state"]),
     )

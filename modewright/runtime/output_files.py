@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from language.text.sanitise import truncate
 from language.text.temporary_files import postpone_signals
 
 DEFAULT_FILE_MODE = 0o644
@@ -35,7 +36,7 @@ def resolve_output(path: Path) -> Path:
     except (FileNotFoundError, NotADirectoryError):
         pass
     except OSError as error:
-        raise OutputError(f"{path}: {error.strerror}") from None
+        raise OutputError(f"{truncate(str(path))}: {error.strerror}") from None
     except ValueError:
         raise OutputError(f"{str(path)!r}: this is no name of a file") from None
     return path.resolve()
