@@ -68,6 +68,7 @@ def looked_at_after(
     )
 
 
+@pytest.mark.long
 def test_a_stand_in_goes_and_what_it_gained_is_that_of_the_other(bench: ModelSet) -> None:
     found = looked_at_after(bench, {"T_d_w_s": 0.03}, LAG, DELAY)
     (kept,) = found.effects

@@ -60,6 +60,7 @@ def test_the_form_that_recordings_show_is_named(bench: ModelSet, rise: float, na
         assert choose_form(own, base, units, best, [best]) is best, "there is no other form"
 
 
+@pytest.mark.long
 def test_a_form_is_fitted_from_where_the_other_is(bench: ModelSet) -> None:
     """One that was left where it fits badly is not the reason why the other one is named."""
     own = rubbing(bench, 3.0)

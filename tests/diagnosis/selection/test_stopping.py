@@ -54,6 +54,7 @@ def test_drifts_that_do_not_go_along_with_an_effect_are_left_out(bench: ModelSet
     assert disturbance_gain(bench, model, bench.disturbances) > -float("inf")
 
 
+@pytest.mark.long
 def test_no_further_effect_is_looked_for_where_there_is_no_room(
     bench: ModelSet, rubbing: ModelSet
 ) -> None:

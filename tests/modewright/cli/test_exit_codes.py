@@ -197,6 +197,7 @@ def test_a_defect_of_ours_is_4_with_a_report(
     report.unlink()
 
 
+@pytest.mark.long
 def test_an_interrupt_is_130() -> None:
     code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
     code += "import sys; sys.argv = ['modewright', 'demo', '--out', 'build'];"
