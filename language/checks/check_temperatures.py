@@ -21,15 +21,10 @@ from language.expressions.syntax_tree import (
     children,
     walk,
 )
-from language.expressions.units import parse_unit
 from language.model.automaton import Automaton
 from language.model.declaration import Formula, Input, State
 from language.model.used_names import formulas_of
 from language.text.diagnostic import Problems
-
-ABSOLUTE_TEMPERATURE = 150
-"""Lowest bound [K] of a range above which a quantity in K is no difference of temperatures."""
-KELVIN = parse_unit("K").dimension
 
 Kind = Literal["point", "difference"] | None
 """Meaning of a value: a temperature on the scale, a difference of two, or not known."""
@@ -38,13 +33,13 @@ Kind = Literal["point", "difference"] | None
 def check_temperatures(automaton: Automaton, problems: Problems) -> None:
     """Warn of sums of two temperatures, and of comparisons of a temperature with a difference.
 
-    A name is a temperature if it is declared in degC; a state or an input also if its range starts
-    above ABSOLUTE_TEMPERATURE, and a state if its start value has the unit degC. A sum that is a
-    factor or a dividend is accepted, because a mean value is such a sum.
+    A name is a temperature if it is declared in degC, a state also if its start value has the unit
+    degC. A quantity in K may be a temperature or a difference, so nothing is known of it. A sum
+    that is a factor or a dividend is accepted, because a mean value is such a sum.
     """
-    for named, label in _senseless_uses(automaton, ()):
-        help = f"if `{named[-1].path}` is a difference, declare it in K: 3 degC are 276.15 K"
-        problems.warning("temperature", named[-1].span, label, help)
+    for named, label in _meaningless_uses(automaton, ()):
+        hint = f"if `{named[-1].path}` is a difference, declare it in K: 3 degC are 276.15 K"
+        problems.warning("temperature", named[-1].span, label, hint)
 
 
 def parameters_used_as_differences(automaton: Automaton, in_celsius: Collection[str]) -> set[str]:
@@ -52,11 +47,11 @@ def parameters_used_as_differences(automaton: Automaton, in_celsius: Collection[
 
     Their values are given in degC, whatever the unit of their declaration.
     """
-    uses = _senseless_uses(automaton, in_celsius)
+    uses = _meaningless_uses(automaton, in_celsius)
     return {one.path for named, _ in uses for one in named} & set(in_celsius)
 
 
-def _senseless_uses(
+def _meaningless_uses(
     automaton: Automaton, in_celsius: Collection[str]
 ) -> list[tuple[list[Name], str]]:
     """Return the parameters in degC in each sum or comparison without meaning, and what it is.
@@ -79,15 +74,16 @@ def _temperatures(automaton: Automaton) -> Iterator[str]:
             yield name
     variables: dict[str, Input | State] = {**automaton.inputs, **automaton.state_variables}
     for name, variable in variables.items():
-        low = variable.range[0] if variable.range else 0
-        is_high = variable.unit.dimension == KELVIN and low >= ABSOLUTE_TEMPERATURE
-        if variable.unit.offset or is_high:
+        if variable.unit.offset:
             yield name
     for name, state in automaton.state_variables.items():
-        if any(
-            isinstance(one, NumberLiteral) and one.unit.offset for one in walk(state.initial.tree)
-        ):
+        if has_celsius(state.initial.tree):
             yield name
+
+
+def has_celsius(tree: SyntaxTree) -> bool:
+    """Return whether an expression has a number in degC."""
+    return any(isinstance(one, NumberLiteral) and one.unit.offset for one in walk(tree))
 
 
 class _TemperatureCheck:

@@ -6,11 +6,12 @@ from collections.abc import Collection, Mapping
 
 from language.checks.check_automaton import check_automaton
 from language.checks.check_number_range import check_numbers
-from language.checks.check_temperatures import parameters_used_as_differences
+from language.checks.check_temperatures import has_celsius, parameters_used_as_differences
+from language.expressions.parser import parse_expression
 from language.ir.program import Program
 from language.loading.automaton_reader import read_automaton
 from language.model.automaton import Automaton
-from language.overlays.expand_document import Project, expand_document, parameters_of
+from language.overlays.expand_document import Project
 from language.passes.constant_folding import run_passes
 from language.programs.continuous_program import lower_continuous_automaton
 from language.programs.sampled_program import lower_sampled_automaton
@@ -27,37 +28,27 @@ def automaton_of(
     """Return the checked automaton of a document with some parameter values replaced.
 
     `values` are new values by name. Warnings are added to `problems`. Raises SpecError with all
-    problems, those in `problems` included. A value in degC of a parameter that is declared in K and
-    used as a difference of temperatures is an error, too.
+    problems, those in `problems` included. A new value in degC of a parameter that is used as a
+    difference of temperatures is an error, too.
     """
     problems = problems or Problems()
     automaton = check_automaton(read_automaton(document, project, values, problems), problems)
-    _refuse_celsius_differences(automaton, document, project, values or {}, problems)
+    _refuse_celsius_differences(automaton, values or {}, problems)
     return automaton
 
 
 def _refuse_celsius_differences(
-    automaton: Automaton,
-    document: Document,
-    project: Project,
-    values: Mapping[str, YamlNode],
-    problems: Problems,
+    automaton: Automaton, values: Mapping[str, YamlNode], problems: Problems
 ) -> None:
     """Raise SpecError for each new value in degC that would be used as a difference."""
     in_celsius = {
         name: node
         for name, node in values.items()
-        if isinstance(node, ScalarNode) and node.text.endswith(" degC")
+        if isinstance(node, ScalarNode) and has_celsius(parse_expression(node))
     }
-    if not in_celsius:
-        return
-    declared = parameters_of(expand_document(document, project).root, project)
     for name in sorted(parameters_used_as_differences(automaton, in_celsius)):
-        table = declared.get(name)
-        texts = (table.text_of("value"), table.text_of("unit")) if table else ()
-        if not any(text.endswith("degC") for text in texts):
-            label = f"`{name}` is a difference of temperatures: 3 degC are 276.15 K"
-            problems.error("temperature", in_celsius[name].span, label, "write it in K, like `3 K`")
+        label = f"`{name}` is a difference of temperatures: 3 degC are 276.15 K"
+        problems.error("temperature", in_celsius[name].span, label, "write it in K, like `3 K`")
     problems.raise_if_errors()
 
 

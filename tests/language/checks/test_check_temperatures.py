@@ -21,7 +21,7 @@ parameters:
   hyst:  {{value: 3 K}}
   bad:   {{value: 3 degC}}
 inputs:
-  T:    {{unit: K, range: [230, 400]}}
+  T:    {{unit: degC, range: [-40, 130]}}
   rise: {{unit: K, range: [0, 100]}}
 initial: a
 modes:
@@ -70,8 +70,9 @@ def test_a_temperature_is_no_difference(guard: str, names: list[str], tmp_path: 
         ("T < T_set - hyst", "hyst=2 degC", True),
         ("T > T_set + hyst", "hyst=2 K", False),
         ("T > hyst", "hyst=2 degC", False),
+        ("T > T_set + hyst", "hyst=-2 degC", True),
         ("T > T_set + hyst", "T_set=25 degC", False),
-        ("T > T_set + bad", "bad=2 degC", False),  # as it is declared
+        ("T > T_set + bad", "bad=2 degC", True),
     ],
 )
 def test_a_new_value_in_degc_is_no_difference(
