@@ -105,6 +105,7 @@ check-floors: setup
 
 check-specs: setup
 	$(BIN)/modewright check --all
+	$(BIN)/modewright format --check spec
 
 check-tests: setup
 	$(BIN)/modewright test

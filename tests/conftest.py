@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import gc
 import os
+import signal
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -24,6 +26,15 @@ for name in ("load", "program"):
 settings.register_profile("ci", derandomize=True, max_examples=30, deadline=None)
 settings.register_profile("verify", max_examples=1000, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
+
+
+for number in (signal.SIGINT, signal.SIGHUP):
+    # A process in the background (nohup, a job of a script) ignores these, and so would its
+    # children, to which tests send them.
+    with suppress(ValueError):  # not in the main thread
+        if signal.getsignal(number) == signal.SIG_IGN:
+            is_interrupt = number == signal.SIGINT
+            signal.signal(number, signal.default_int_handler if is_interrupt else signal.SIG_DFL)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Protocol
 
 from codegen.emit.c_names import C_REAL_TYPE
@@ -26,9 +26,14 @@ class CNameMap(Protocol):
     def is_unsigned(self, name: str) -> bool:
         """Tell whether a variable is an unsigned integer in C."""
 
+    def is_volatile(self, name: str) -> bool:
+        """Tell whether a constant is on a page that another program may change at any time."""
+
 
 LIBM_FUNCTIONS: Mapping[str, str] = {"abs": "fabs", "sqrt": "sqrt", "floor": "floor"}
 """Functions of the C library that are exact; all others come from ha_math."""
+TABLE_FUNCTIONS = ("lookup", "lookup2")
+"""Functions with a table among their arguments."""
 MATH_SUFFIX: Mapping[NumberType, str] = {"float64": "", "float32": "f"}
 """The suffix of a C function for a number type: sqrt, sqrtf."""
 LOGICAL_OPERATORS: Mapping[str, str] = {"and": "&&", "or": "||"}
@@ -46,7 +51,7 @@ def emit_expression(expr: Expr, c_names: CNameMap) -> str:
     Every compound operand is in parentheses, also a unary minus or negative literal; except a left
     operand that C evaluates first anyway (LEFT_ASSOCIATIVE). A comparison of a variable with an
     integer literal uses `integer_constant`; if exactly one of two compared variables is unsigned,
-    it is cast to int32_t.
+    it is cast to int32_t. A lookup in a volatile table calls the function of the header ha_page.
     """
     match expr:
         case Value(value):
@@ -76,7 +81,17 @@ def emit_expression(expr: Expr, c_names: CNameMap) -> str:
             return f"{parts[0]} ? {parts[1]} : {parts[2]}"
         case Call(function, arguments):
             texts = [emit_expression(argument, c_names) for argument in arguments]
+            if reads_table(expr, c_names.is_volatile):
+                function = f"page_{function}"
             return _emit_call(function, texts, c_names.number)
+
+
+def reads_table(expr: Expr, is_selected: Callable[[str], bool]) -> bool:
+    """Tell whether an expression is a lookup in a table whose name `is_selected` accepts."""
+    match expr:
+        case Call(function, arguments) if function in TABLE_FUNCTIONS:
+            return any(isinstance(one, Ref) and is_selected(one.name) for one in arguments)
+    return False
 
 
 def format_literal(value: float | int | bool, number: NumberType) -> str:

@@ -46,14 +46,10 @@ def emit_math_files(number: NumberType) -> dict[str, str]:
     """
     suffix = MATH_SUFFIX[number]
     context = {
+        **_number_context(number),
         "functions": [
             _function_context(function, number) for function in FUNCTIONS_BY_TYPE[number].values()
         ],
-        "version": product_version(),
-        "real": C_REAL_TYPE[number],
-        "suffix": suffix,
-        "zero": format_literal(0.0, number),
-        "one": format_literal(1.0, number),
         "layout": FLOAT_FORMATS[number],
         "lowest": format_literal(float(FLOAT_FORMATS[number].lowest), number),
         "highest": format_literal(float(FLOAT_FORMATS[number].highest), number),
@@ -61,6 +57,27 @@ def emit_math_files(number: NumberType) -> dict[str, str]:
     return {
         f"ha_math{suffix}.h": render("emit/ha_math.h.jinja", context),
         f"ha_math{suffix}.c": render("emit/ha_math.c.jinja", context),
+    }
+
+
+def emit_page_header(number: NumberType) -> dict[str, str]:
+    """Return the header `ha_page.h`, for float32 `ha_pagef.h`, by its file name (rule C14).
+
+    It holds the lookups of tables on a calibration page, whose values are volatile. They have the
+    bits of the lookups of ha_math.
+    """
+    text = render("emit/ha_page.h.jinja", _number_context(number))
+    return {f"ha_page{MATH_SUFFIX[number]}.h": text}
+
+
+def _number_context(number: NumberType) -> dict[str, Any]:
+    """Return what the templates of all headers need: version, C type, suffix, 0 and 1."""
+    return {
+        "version": product_version(),
+        "real": C_REAL_TYPE[number],
+        "suffix": MATH_SUFFIX[number],
+        "zero": format_literal(0.0, number),
+        "one": format_literal(1.0, number),
     }
 
 
@@ -77,6 +94,9 @@ class _LocalNameMap:
         return str(number)
 
     def is_unsigned(self, name: str) -> bool:
+        return False
+
+    def is_volatile(self, name: str) -> bool:
         return False
 
 

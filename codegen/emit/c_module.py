@@ -9,8 +9,8 @@ import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from codegen.emit.c_expression import MATH_SUFFIX, format_literal
-from codegen.emit.c_math import emit_math_files
+from codegen.emit.c_expression import MATH_SUFFIX, format_literal, reads_table
+from codegen.emit.c_math import emit_math_files, emit_page_header
 from codegen.emit.c_names import (
     C_REAL_TYPE,
     SOLVED_PREFIX_CONSTANT,
@@ -37,6 +37,7 @@ from codegen.toolchain.templates import product_version, render
 from language.ir.ops import FaultBit
 from language.ir.printer import digest
 from language.ir.program import ENTRY_BLOCKS, Program, Variable
+from language.ir.rewrite_ops import direct_expressions, walk_post_order
 from language.ir.traversal import called_blocks, names_used, walk_ops
 from language.lowering.calibration_stamp import STALE_CALIBRATION
 from language.lowering.invariants import INVARIANT_PREFIX, INVARIANTS
@@ -100,7 +101,9 @@ INLINE_FUNCTIONS = ("min", "max", "clip", "sign", "pow2", "whole", "within", "lo
 def emit_c_files(
     program: Program, by_magnitude: bool = True, fast_path: FastPathMode = "on"
 ) -> dict[str, str]:
-    """Return the C files of a Program by name: `X.h`, `X_MemMap.h`, `X.c`, ha_math if it is used.
+    """Return the C files of a Program by name: `X.h`, `X_MemMap.h`, `X.c`, and those of functions.
+
+    Functions are in ha_math and ha_page, each only if the C calls it.
 
     `by_magnitude` is passed to `merge_range_checks`, `fast_path` to `add_fast_path`. The files
     contain the digest of the given Program, before any pass. Raises ValueError for a Program
@@ -119,6 +122,8 @@ def emit_c_files(
     }
     if context["uses_math"]:
         files.update(emit_math_files(program.number_type))
+    if context["uses_page_tables"]:
+        files.update(emit_page_header(program.number_type))
     return files
 
 
@@ -190,8 +195,30 @@ def module_context(program: Program, page_layout: PageLayout = HOST_PAGE) -> dic
         ],
         "has_stamps": "compare_stamps" in program.blocks,
         "uses_math": bool(called_functions & {*FUNCTIONS_BY_TYPE[number], *INLINE_FUNCTIONS}),
+        "uses_page_tables": _uses_volatile_tables(program, page_layout),
         "uses_libm": bool(called_functions & {"abs", "sqrt", "floor"}),
     }
+
+
+def _uses_volatile_tables(program: Program, page_layout: PageLayout) -> bool:
+    """Tell whether a block looks up a value in a table on the page, and the page is volatile."""
+    is_volatile = _names_in_function(program, frozenset(), page_layout).is_volatile
+    return any(
+        reads_table(part, is_volatile)
+        for block in program.blocks.values()
+        for op in walk_ops(block)
+        for expr in direct_expressions(op)
+        for part in walk_post_order(expr)
+    )
+
+
+def _names_in_function(program: Program, local: frozenset[str], page_layout: PageLayout) -> CNames:
+    """Return the C text of names inside a function with the given local variables."""
+    return CNames(
+        program,
+        local,
+        SOLVED_PREFIX_ON_PAGE if page_layout.holds_solved else SOLVED_PREFIX_CONSTANT,
+    )
 
 
 def _name_context(program: Program) -> dict[str, Any]:
@@ -328,11 +355,7 @@ def _emit_function(
     keyword: str,
 ) -> dict[str, Any]:
     """Return the template context of the function of one block: its parameters and lines."""
-    c_names = CNames(
-        program,
-        local,
-        SOLVED_PREFIX_ON_PAGE if page_layout.holds_solved else SOLVED_PREFIX_CONSTANT,
-    )
+    c_names = _names_in_function(program, local, page_layout)
     writer = StatementEmitter(program, usage_by_block, local - loop_variables, c_names, kinds)
     declared = [f"{INDENT}{kinds[n]} {c_member(n)};" for n in sorted(loop_variables)]
     types = {

@@ -104,6 +104,10 @@ class CNames:
         """
         return name in self._unsigned_variables
 
+    def is_volatile(self, name: str) -> bool:
+        """Tell whether a constant is on the page of an ECU, which is volatile (rule C14)."""
+        return name.startswith("calibration.") and self.solved_prefix == SOLVED_PREFIX_ON_PAGE
+
     @cached_property
     def _unsigned_variables(self) -> frozenset[str]:
         kinds = {v.name: c_type(v, self.number) for v in self.program.variables}

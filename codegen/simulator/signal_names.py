@@ -45,6 +45,10 @@ class SignalNameMap:
         """Return False: signals are reals."""
         return False
 
+    def is_volatile(self, name: str) -> bool:
+        """Return False: nobody changes signals during a step."""
+        return False
+
     def emit_signal(self, name: str) -> str:
         """Return the C text of an input, a sensor value or an output `instance.signal`.
 
@@ -94,6 +98,10 @@ class TimeNameMap:
 
     def is_unsigned(self, name: str) -> bool:
         """Return False: the time is a real."""
+        return False
+
+    def is_volatile(self, name: str) -> bool:
+        """Return False: nobody changes the time during a step."""
         return False
 
 

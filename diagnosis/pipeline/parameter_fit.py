@@ -25,6 +25,7 @@ from diagnosis.validation.free_simulation import compare_misfits
 from diagnosis.validation.misfit import Misfit
 from language.loading.load import automaton_of
 from language.model.automaton import Automaton
+from language.model.declaration import Parameter
 from language.text.diagnostic import Problems, Source, Span, suggest_name
 from language.text.document import Document, MappingNode
 from language.text.node_edit import put_node
@@ -148,10 +149,12 @@ def restrict_free_parameters(
         parameter = automaton.parameters.get(name)
         if parameter is None:
             label = f"`{automaton.name}` has no parameter `{name}`"
+            fittable = [one.name for one in automaton.parameters.values() if _can_be_fitted(one)]
             hint = suggest_name(name, automaton.parameters)
+            hint = hint or f"parameters that can be fitted: {', '.join(fittable) or 'none'}"
             asked = Source("command line", (name,))
             problems.error("name", Span(asked, 1, 1, max(1, len(name))), label, hint)
-        elif parameter.range is None or parameter.value is None:
+        elif not _can_be_fitted(parameter):
             label = f"`{name}` has no range to be fitted in"
             problems.error("range", parameter.span, label, "`range: [low, high]` beside its value")
     problems.raise_if_errors()
@@ -162,6 +165,11 @@ def restrict_free_parameters(
             rest = {key: entry for key, entry in table.entries.items() if key != "range"}
             root = put_node(root, ("parameters", name), MappingNode(rest, table.span))
     return dataclasses.replace(document, root=root)
+
+
+def _can_be_fitted(parameter: Parameter) -> bool:
+    """Return whether a parameter has a range and a value."""
+    return parameter.range is not None and parameter.value is not None
 
 
 def _parameter_table(root: MappingNode, name: str) -> MappingNode | None:

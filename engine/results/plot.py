@@ -236,7 +236,7 @@ def _require_matches(runs: Sequence[SampledRun], patterns: Sequence[str]) -> Non
     known = list(dict.fromkeys(name for run in runs for name in run.signals))
     for pattern in patterns:
         if not fnmatch.filter(known, pattern):
-            hint = suggest_name(pattern, known) or f"signals: {', '.join(known)}"
+            hint = suggest_name(pattern, known) or f"the signals are {', '.join(known)}"
             raise ValueError(f"no signal matches `{pattern}`: {hint}")
 
 

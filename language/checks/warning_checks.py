@@ -15,6 +15,7 @@ from language.checks.check_dead_transitions import (
 from language.checks.check_instant_cycles import check_long_cycles
 from language.checks.check_range_violation import check_range_violations
 from language.checks.check_reachability import check_blocked_modes, check_final_modes
+from language.checks.check_temperatures import check_temperatures
 from language.checks.check_zeno import check_zeno
 from language.model.automaton import Automaton
 from language.smt.query_engine import QueryEngine
@@ -25,8 +26,8 @@ def check_warnings(automaton: Automaton, problems: Problems) -> None:
     """Report the warnings of a checked automaton.
 
     They are dead transitions, blocked and stuck modes, final modes without effect, close waits,
-    cycles, Zeno behaviour and assignments past a range. Unused names and unreachable modes are
-    reported by `check_automaton`. The model is not examined.
+    cycles, Zeno behaviour, assignments past a range and sums of temperatures in degC. Unused names
+    and unreachable modes are reported by `check_automaton`. The model is not examined.
     """
     query_engine = QueryEngine(automaton)
     dead_transitions = check_dead_transitions(automaton, query_engine, problems)
@@ -38,3 +39,4 @@ def check_warnings(automaton: Automaton, problems: Problems) -> None:
     check_chart_cycles(automaton, query_engine, problems)
     check_zeno(automaton, query_engine, problems)
     check_range_violations(automaton, query_engine, problems)
+    check_temperatures(automaton, problems)

@@ -21,7 +21,7 @@ assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp 
 stdarg stdatomic stdbool stddef stdint stdio stdlib stdnoreturn string tgmath threads time uchar
 wchar wctype"""
 """Headers of the C library (ISO/IEC 9899:2011, 7.1.2), without their suffix."""
-FILE_WORDS = frozenset({"main", "ha_math", *C_HEADERS.split()})
+FILE_WORDS = frozenset({"main", "ha_math", "ha_page", *C_HEADERS.split()})
 """File names that the files of an automaton would collide with."""
 
 DEVICE_NAME_PATTERN = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)

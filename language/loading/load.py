@@ -6,6 +6,8 @@ from collections.abc import Collection, Mapping
 
 from language.checks.check_automaton import check_automaton
 from language.checks.check_number_range import check_numbers
+from language.checks.check_temperatures import has_celsius, parameters_used_as_differences
+from language.expressions.parser import parse_expression
 from language.ir.program import Program
 from language.loading.automaton_reader import read_automaton
 from language.model.automaton import Automaton
@@ -26,10 +28,28 @@ def automaton_of(
     """Return the checked automaton of a document with some parameter values replaced.
 
     `values` are new values by name. Warnings are added to `problems`. Raises SpecError with all
-    problems, those in `problems` included.
+    problems, those in `problems` included. A new value in degC of a parameter that is used as a
+    difference of temperatures is an error, too.
     """
     problems = problems or Problems()
-    return check_automaton(read_automaton(document, project, values, problems), problems)
+    automaton = check_automaton(read_automaton(document, project, values, problems), problems)
+    _refuse_celsius_differences(automaton, values or {}, problems)
+    return automaton
+
+
+def _refuse_celsius_differences(
+    automaton: Automaton, values: Mapping[str, YamlNode], problems: Problems
+) -> None:
+    """Raise SpecError for each new value in degC that would be used as a difference."""
+    in_celsius = {
+        name: node
+        for name, node in values.items()
+        if isinstance(node, ScalarNode) and has_celsius(parse_expression(node))
+    }
+    for name in sorted(parameters_used_as_differences(automaton, in_celsius)):
+        label = f"`{name}` is a difference of temperatures: 3 degC are 276.15 K"
+        problems.error("temperature", in_celsius[name].span, label, "write it in K, like `3 K`")
+    problems.raise_if_errors()
 
 
 def load_automaton(reference: str, project: Project) -> Automaton:

@@ -98,7 +98,10 @@ class _MapReader(Reader):
 
     def _read_databases(self, node: YamlNode | None) -> tuple[ScalarNode, ...]:
         """Return the names of DBC files: a single one or a list."""
-        return (node,) if isinstance(node, ScalarNode) else tuple(self.read_list(node, "dbc"))
+        names = (node,) if isinstance(node, ScalarNode) else tuple(self.read_list(node, "dbc"))
+        for name in names:
+            self.check_file_name(name.text, name.span, "dbc")
+        return names
 
     def _read_windows(self, node: YamlNode | None) -> dict[str, tuple[Window, ...]]:
         """Return the windows by file name; a bare list applies to all files."""
@@ -106,6 +109,8 @@ class _MapReader(Reader):
             return {}
         if not isinstance(node, MappingNode):
             return {ALL_FILES: self._read_window_list(node)}
+        for entry in node:
+            self.check_file_name(entry.key, entry.span, "windows")
         return {entry.key: self._read_window_list(entry.node) for entry in node}
 
     def _read_window_list(self, node: YamlNode) -> tuple[Window, ...]:
@@ -169,8 +174,8 @@ class _MapReader(Reader):
         return ColumnMapping(
             name=entry.key,
             columns=tuple(names),
-            to=self.read_string(to, "to", entry.span) if to else None,
-            compare=self.read_string(compare, "compare", entry.span) if compare else None,
+            to=self.read_reference(to, "to") if to else None,
+            compare=self.read_reference(compare, "compare") if compare else None,
             unit=self.read_unit(table.get("unit")),
             scale=self._read_scale(table),
             sign=int(self.read_choice(table.get("sign"), "sign", ("1", "-1"), "1")),

@@ -110,6 +110,8 @@ class _ScenarioReader(StimulusReader):
             return None
         table = self.read_mapping(node, "recording", RECORDING_KEYS)
         file = self.read_scalar(table.get("file"), "file", table.span)
+        if file:
+            self.check_file_name(file.text, file.span, "file")
         if "map" in table.entries:
             named = self.read_scalar(table.get("map"), "map", table.span)
             if named is None:

@@ -19,6 +19,15 @@ def names_read_by(automaton: Automaton, include_waits: bool = True) -> Iterator[
     included, those of the automaton's `model` are not. Expressions of `wait` are left out if
     `include_waits` is false.
     """
+    for part in formulas_of(automaton, include_waits):
+        if isinstance(part, Formula):
+            yield from part.reads
+        else:
+            yield from (name.path for side in (part.left, part.right) for name in names(side))
+
+
+def formulas_of(automaton: Automaton, include_waits: bool = True) -> Iterator[Formula | Balance]:
+    """Yield all expressions of an automaton as `names_read_by` reads them, in no defined order."""
     stack: list[Any] = [
         getattr(automaton, field.name)
         for field in dataclasses.fields(automaton)
@@ -26,10 +35,8 @@ def names_read_by(automaton: Automaton, include_waits: bool = True) -> Iterator[
     ]
     while stack:
         part = stack.pop()
-        if isinstance(part, Formula):
-            yield from part.reads
-        elif isinstance(part, Balance):
-            yield from (name.path for side in (part.left, part.right) for name in names(side))
+        if isinstance(part, Formula | Balance):
+            yield part
         elif isinstance(part, Mapping):
             stack += part.values()
         elif isinstance(part, tuple):

@@ -306,7 +306,7 @@ class _EffectReader(Reader):
             if path[:2] == ("redirect", "except"):
                 return scalar
             allowed = {*known, *own, *reads}
-            if path[0] == "equations" and path[1].startswith("$"):
+            if path[0] == "equations" and path[-1].startswith("$"):
                 allowed.add("base")
             for part in _parse_formula(path, scalar, self.problems):
                 check_functions(part, self.problems)

@@ -6,6 +6,7 @@ A reader reports problems into one collector and continues with a default value.
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import cast
@@ -126,6 +127,29 @@ class Reader:
         """
         scalar = self.read_scalar(node, what, span)
         return scalar.text if scalar else ""
+
+    def read_reference(self, node: YamlNode, what: str) -> str:
+        """Return the text of a scalar that names something; "" with a problem reported otherwise.
+
+        Reported are a node that is no scalar, and an empty text. `what` names the node.
+        """
+        text = self.read_string(node, what, node.span)
+        if isinstance(node, ScalarNode) and not text:
+            self.problems.error("missing", node.span, f"`{what}` has no name")
+        return text
+
+    def check_file_name(self, name: str, span: Span, what: str) -> None:
+        """Report a name of a file that is empty or has a control character, such as NUL.
+
+        `what` names the key. Whether there is such a file is not checked.
+        """
+        if not name:
+            self.problems.error("missing", span, f"`{what}` names no file")
+        for character in name:
+            if unicodedata.category(character) == "Cc":
+                label = f"a file name has no control character, like U+{ord(character):04X} here"
+                self.problems.error("name", span, label)
+                return
 
     def read_alternative(
         self, entry: Entry, key: str, alternatives: Mapping[str, tuple[str, ...]], verb: str

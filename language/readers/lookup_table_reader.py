@@ -54,11 +54,15 @@ class LookupTableReader(Reader):
         return LookupTable(axes, unit, values)
 
     def _read_axis_names(self, table: MappingNode) -> list[ScalarNode]:
-        """Return at most two names of axes from `over`."""
+        """Return at most two names of axes from `over`; an empty name is reported."""
         node = table.get("over")
         if isinstance(node, ScalarNode):
-            return [node]
-        return self.read_list(node, "over")[:2] if node is not None else []
+            names = [node]
+        else:
+            names = self.read_list(node, "over")[:2] if node is not None else []
+        for name in names:
+            self.read_reference(name, "over")
+        return names
 
     def _read_rows(
         self,

@@ -114,7 +114,7 @@ class ModeReader(Reader):
         if node is None:
             hint = f"like `initial: {next(iter(modes))}`" if modes else ""
             self.problems.error("missing", span, "`initial` is missing", hint)
-        name = self.read_string(node, "initial", span) if node else ""
+        name = self.read_reference(node, "initial") if node else ""
         if name and name not in modes and node is not None:
             label = f"there is no mode `{name}`"
             self.problems.error("name", node.span, label, suggest_name(name, modes))

@@ -67,6 +67,10 @@ CODES: Mapping[str, tuple[str, str]] = {
     "table": ("MW316", "A lookup table is not complete or is not used as a table."),
     "order": ("MW317", "Values are not in ascending order although they must be."),
     "past": ("MW318", "An assigned value may lie outside the range of its target."),
+    "temperature": (
+        "MW319",
+        "A temperature in degC is used as a difference of temperatures.",
+    ),
     # Overlays: variants, effects, calibrations.
     "overlay": (
         "MW401",

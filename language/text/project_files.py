@@ -73,18 +73,22 @@ class Project:
     def _index_by_name(self, is_wanted: Callable[[str], bool]) -> dict[str, list[Path]]:
         """Return the files of the wanted kinds by document name.
 
-        A name may have several project files.
+        A name may have several project files. The first head of a file is its document. Further
+        heads are mistakes, and such a name has this file only if no document has the name.
         """
         own: dict[str, list[Path]] = {}
+        further: dict[str, list[Path]] = {}
+        seen: set[Path] = set()
         for path, kind, name in self._heads:
             if is_wanted(kind):
-                own.setdefault(name, []).append(path)
-        shipped = Path(str(resources.files("spec")))
+                (further if path in seen else own).setdefault(name, []).append(path)
+            seen.add(path)
+        shipped = shipped_folder()
         if shipped.resolve() != (self.root / "spec").resolve():
             for path, kind, name in _shipped_heads(shipped):
                 if is_wanted(kind):
                     own.setdefault(name, [path])
-        return own
+        return further | own
 
     @cached_property
     def _heads(self) -> tuple[DocumentHead, ...]:
@@ -146,6 +150,16 @@ class Project:
                 hint = suggest_name(reference, index) or "a name of a spec below spec/, or a path"
             problems.error("name", place, f"there is no {what} named `{reference}`", hint)
         raise SpecError(problems.reported)
+
+
+def shipped_folder() -> Path:
+    """Return the folder of the specs of the distribution."""
+    return Path(str(resources.files("spec")))
+
+
+def is_shipped(path: Path) -> bool:
+    """Return whether a file is a spec of the distribution."""
+    return path.resolve().is_relative_to(shipped_folder().resolve())
 
 
 def display_path(path: Path) -> str:

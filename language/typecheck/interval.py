@@ -74,6 +74,31 @@ def even_power(base: Interval, exponent: int) -> Interval:
     return Interval(0.0 if base.low <= 0.0 <= base.high else min(ends), max(ends), base.is_certain)
 
 
+def inverse_power(base: Interval, exponent: int) -> Interval:
+    """Return the interval of 1 / base^exponent, with an exponent of at least 1, over an interval.
+
+    0 must lie outside of the bounds of `base`. Where the power underflows the result is unbounded
+    on the side of its sign; the certainty is that of `base`.
+    """
+    ends = [power_or_inf(base.low, exponent), power_or_inf(base.high, exponent)]
+    is_negative = base.high < 0.0 and exponent % 2 == 1
+    nearest, farthest = sorted(map(abs, ends))
+    low = 1.0 / farthest if farthest else sys.float_info.max
+    high = 1.0 / nearest if nearest else math.inf
+    bounds = (-high, -low) if is_negative else (low, high)
+    return Interval(*bounds, base.is_certain)
+
+
+def sum_of(left: Interval, right: Interval) -> Interval:
+    """Return the interval of a sum; infinite bounds of opposite sign give no bound."""
+    low, high = left.low + right.low, left.high + right.high
+    return Interval(
+        -math.inf if low != low else low,
+        math.inf if high != high else high,
+        left.is_certain and right.is_certain,
+    )
+
+
 def power_or_inf(value: float, exponent: int) -> float:
     """Return a whole power of a number; on overflow an infinity of the right sign.
 

@@ -33,7 +33,9 @@ from language.typecheck.interval import (
     even_power,
     function_image,
     image_of_corners,
+    inverse_power,
     power_or_inf,
+    sum_of,
 )
 
 Constraints = Mapping[SyntaxTree, Interval]
@@ -136,20 +138,19 @@ class RangeAnalysis:
             self.interval_of(tree.left, constraints),
             self.interval_of(tree.right, constraints),
         )
-        known = left.is_certain and right.is_certain
         match tree.operator:
             case "+":
-                return Interval(left.low + right.low, left.high + right.high, known)
+                return sum_of(left, right)
             case "-":
-                return Interval(left.low - right.high, left.high - right.low, known)
+                return sum_of(left, Interval(-right.high, -right.low, right.is_certain))
             case "*":
                 if tree.left == tree.right:
                     return even_power(left, 2)
                 return image_of_corners(left, right, lambda a, b: a * b)
         if right.contains_zero and self.report:
             self.report("divisor", tree.right, right)
-        if right.low <= 0.0 <= right.high:
-            return UNBOUNDED
+        if right.low <= 0.0 <= right.high or 0.0 in (right.low, right.high):
+            return UNBOUNDED  # an empty interval of an alternative that is never taken may end at 0
         return image_of_corners(left, right, lambda a, b: a / b)
 
     def _power(self, tree: Power, base: Interval, exponent: int) -> Interval:
@@ -159,8 +160,7 @@ class RangeAnalysis:
         if exponent < 0 and base.low <= 0.0 <= base.high:
             return UNBOUNDED
         if exponent < 0:
-            whole = self._power(tree, base, -exponent)
-            return image_of_corners(Interval(1.0, 1.0, True), whole, lambda a, b: a / b)
+            return inverse_power(base, -exponent)
         if exponent % 2 == 0:
             return even_power(base, exponent)
         return Interval(

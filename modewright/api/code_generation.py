@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import get_args
 
 from codegen.coverage.boundary_values import generate_boundary_sequences
@@ -200,7 +201,7 @@ def mcdc(
 ) -> McdcCoverage:
     """Return the MC/DC coverage of the C of an automaton.
 
-    The sequences are those of the project's tests that run this automaton with the same Program,
+    The sequences are those of the tests (`find_tests`) that run this automaton as it is,
     those that libFuzzer finds in `runs` (0: none) with each of SEEDS, and, for a sampled automaton,
     boundary values of both. With `is_proven` it is proven for a sampled automaton which uncovered
     conditions are infeasible. `numbers` replaces the number type. Raises SpecError,
@@ -209,7 +210,8 @@ def mcdc(
     """
     runs, numbers = to_count(runs, "runs"), number_type_of(numbers)
     automaton, program = _load_automaton_and_program(reference, values, root, calibrations, numbers)
-    sequences = [tape.inputs for tape in _record_project_tests(program, root, numbers)]
+    files = find_tests(root, [Path(automaton.span.source.name)])
+    sequences = [tape.inputs for tape in _record_tests(program, files, root, numbers)]
     ranges = _input_ranges(automaton)
     if runs and not automaton.is_sampled:
         raise ValueError(f"{automaton.name} is continuous: sequences are those of sampled automata")
@@ -238,11 +240,11 @@ def _retained_ranges(automaton: Automaton, program: Program) -> dict[str, tuple[
     return ranges
 
 
-def _record_project_tests(
-    program: Program, root: PathText | None, numbers: NumberType | None
+def _record_tests(
+    program: Program, files: Sequence[str], root: PathText | None, numbers: NumberType | None
 ) -> Iterator[TickLog]:
-    """Yield the tick logs of a Program in the tests of a project."""
-    for test in load_tests(find_tests(root), root):
+    """Yield the tick logs of a Program in the tests of some files."""
+    for test in load_tests(files, root):
         run = with_number_type(test.system, numbers) if numbers else test.system
         if any(one.automaton.name == program.name for one in run.instances.values()):
             tapes = record_ticks(run, test.scenario)[1].values()

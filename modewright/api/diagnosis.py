@@ -128,6 +128,8 @@ def diagnose(
     time_budget = _Budget(optional(to_non_negative, budget, "budget"), tell)
     tell = time_budget.report
     map_name, threshold_text = optional(to_text, map, "map"), to_text(thresholds, "thresholds")
+    if not all(held_out_files):
+        raise ValueError("`held_out` has an empty name: leave it out to hold out nothing")
     require_disjoint(files, held_out_files)
     limits = _read_thresholds(threshold_text)
     checked = check_recordings(files, map_name, spec, root=root)

@@ -49,11 +49,15 @@ def run_health_checks() -> Iterator[HealthCheck]:
 
 
 def _check_dependencies() -> Iterator[HealthCheck]:
-    """Yield the installed version of each dependency; optional ones may be absent."""
+    """Yield the installed version of each dependency, each once; optional ones may be absent."""
+    seen: set[str] = set()
     for line in metadata.requires("modewright") or []:
         requirement, _, marker = line.partition(";")
         name = requirement.split("[")[0].split("<")[0].split(">")[0].split("=")[0].split("~")[0]
         name = name.strip()
+        if name in seen:
+            continue  # several extras have it
+        seen.add(name)
         is_optional = "extra" in marker
         try:
             yield HealthCheck(name, "ok", metadata.version(name))

@@ -30,6 +30,8 @@ from language.overlays.expand_document import (
     Project,
     add_calibrations,
     apply_variant,
+    expand_document,
+    lineage,
     read_document,
 )
 from language.text.arguments import (
@@ -42,8 +44,8 @@ from language.text.arguments import (
     to_text,
     to_texts,
 )
-from language.text.diagnostic import Problem, Problems, SpecError
-from language.text.document import ScalarNode, require_kind
+from language.text.diagnostic import Problem, Problems, SpecError, sort_problems
+from language.text.document import Document, ScalarNode, require_kind
 from lockstep.comparison import Verdict, add_instruction_counts, compare
 from lockstep.comparison_scope import add_notes
 from lockstep.tick_log import TickLog, record_ticks
@@ -90,14 +92,42 @@ def load(
     """Return a checked system with a checked scenario, both by name or path.
 
     `calibrations` and then `values` (`instance.parameter` or `parameter`) replace parameter values
-    of the system. Raises SpecError.
+    of the system. Raises SpecError; if the scenario does not fit the system and is one of another
+    system, the only problem says so.
     """
     project, scalars = to_project(root), parse_values(values)
     scenario_name = to_text(scenario, "scenario")
     system_document = load_calibrated_document(to_text(system, "system"), project, calibrations)
     parsed_system = read_system(system_document, project, scalars)
     document = read_document(project.path_of(scenario_name))
-    return Loaded(parsed_system, read_scenario(document, project, parsed_system))
+    try:
+        return Loaded(parsed_system, read_scenario(document, project, parsed_system))
+    except SpecError as error:
+        _require_own_scenario(document, system_document, project, error)
+        raise
+
+
+def _require_own_scenario(
+    scenario: Document, system: Document, project: Project, error: SpecError
+) -> None:
+    """Raise SpecError if a scenario is valid for the system that it names, but not for `system`.
+
+    `error` has the problems of the scenario with `system`; the first one is the help. Nothing is
+    raised if the scenario names `system` or a document that this extends, or is not valid at all.
+    """
+    try:
+        of = expand_document(scenario, project).root.get("of")
+        if not isinstance(of, ScalarNode):
+            return
+        own_document = project.read(project.path_of(of.text, of.span))
+        if own_document.name in lineage(system, project):
+            return
+        read_scenario(scenario, project, read_system(own_document, project))
+    except SpecError:
+        return
+    label = f"`{scenario.name}` is a scenario of `{own_document.name}`, not of `{system.name}`"
+    first = sort_problems(error.problems)[0].label
+    raise SpecError([Problem("form", of.span, label, f"with `{system.name}`: {first}")]) from None
 
 
 def simulate(

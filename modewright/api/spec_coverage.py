@@ -13,7 +13,7 @@ from expectation.coverage_measurement import (
     names_of,
 )
 from expectation.mcdc import COVERED, Decision
-from language.text.arguments import PathText
+from language.text.arguments import PathText, to_project, to_text
 from language.text.diagnostic import Problem, Source, Span, SpecError
 from modewright.api.spec_tests import find_tests, load_tests
 from modewright.diagram.diagram import Diagram, graph
@@ -64,7 +64,8 @@ def project_coverage_diagram(reference: PathText, root: PathText | None = None) 
     coverages merged. Raises SpecError, also if there is no such test.
     """
     diagram = graph(reference, root)
-    tests = load_tests(find_tests(root), root)
+    file = to_project(root).path_of(to_text(reference, "reference"))
+    tests = load_tests(find_tests(root, [file]), root)
     names = [{each.automaton.name for each in t.system.instances.values()} for t in tests]
     used = [test for test, own in zip(tests, names, strict=True) if diagram.name in own]
     parts = [part for test in used for part in measure_coverage(test) if part.name == diagram.name]

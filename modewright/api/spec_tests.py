@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,7 +24,7 @@ from language.text.arguments import (
     to_texts,
 )
 from language.text.diagnostic import Problem, Problems, Source, Span, SpecError
-from language.text.project_files import HEAD_PATTERN
+from language.text.project_files import HEAD_PATTERN, is_shipped
 from modewright.api.spec_check import spec_files
 from modewright.runtime.back_end_choice import run_in_c
 
@@ -53,13 +53,19 @@ class TestRun:
         return all_passed and not self.difference and self.stopped is None
 
 
-def find_tests(root: PathText | None = None) -> list[str]:
+def find_tests(root: PathText | None = None, specs: Iterable[Path] = ()) -> list[str]:
     """Return the paths of all YAML files below `spec/` that contain a test, sorted by path.
 
-    These are files with a line `test: name` without indentation in their first 64 KiB; they are not
-    parsed.
+    If one of the files `specs` belongs to the distribution, the tests of the distribution follow,
+    except those whose name a document of the project has. A file contains a test if it has a line
+    `test: name` without indentation in its first 64 KiB; it is not parsed.
     """
-    return [str(path) for path in spec_files(to_project(root).root) if _is_test(path)]
+    project = to_project(root)
+    found = [path for path in spec_files(project.root) if _is_test(path)]
+    if any(is_shipped(path) for path in specs):
+        named = sorted(path for paths in project.index.values() for path in paths)
+        found += [path for path in named if is_shipped(path) and _is_test(path)]
+    return list(dict.fromkeys(str(path) for path in found))
 
 
 def load_test(reference: PathText, root: PathText | None = None) -> Test:

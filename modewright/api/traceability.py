@@ -31,6 +31,8 @@ from language.text.document import Document, ScalarNode, read_text
 from language.text.node_edit import find_node, mapping_entries
 from modewright.api.spec_tests import find_tests, load_tests, run_test
 
+SHARED_FILES = ("ha_math", "ha_page")
+"""Begins of the names of C files that all automata share."""
 HEADINGS = ("name", "id", "requirement")
 """First cells, in lower case, that mark a row as headings."""
 
@@ -45,9 +47,10 @@ def trace(
     """Return the requirements that specs, their C and the tests of the project name.
 
     A system includes the automata of its instances and their models. Only tests that run one of
-    these specs count. `listed` is a CSV file of requirements with texts, which come first and are
-    included if nothing names them. With `run` the tests are run on engine and C; else they have no
-    verdicts. Raises SpecError, MissingToolError, and ValueError without a spec.
+    these specs count; for specs of the distribution its tests count, too. `listed` is
+    a CSV file of requirements with texts, which come first and are included if nothing names them.
+    With `run` the tests are run on engine and C; else they have no verdicts. Raises
+    SpecError, MissingToolError, and ValueError without a spec.
     """
     project, requirements = to_project(root), optional(to_path, listed, "listed")
     documents = _load_documents(to_some_texts(specs, "specs"), project)
@@ -57,9 +60,8 @@ def trace(
         for document in documents
         for name in (document.name, *_instance_types(document, project))
     }
-    tests = [
-        test for test in load_tests(find_tests(root), root) if names & _tested_names(test, project)
-    ]
+    files = find_tests(root, [Path(document.source.name) for document in documents])
+    tests = [test for test in load_tests(files, root) if names & _tested_names(test, project)]
     verdicts = [_run_expectations(test) if run else {} for test in tests]
     code = _generate_code(documents, project)
     return trace_requirements(
@@ -80,8 +82,8 @@ def trace_keys(specs: PathTexts, root: PathText | None = None) -> KeyTraceReport
     """Return the lines of C that come from each key of the specs.
 
     A system includes the automata of its instances and their models; an automaton alone only its
-    own C. The texts of ha_math are left out of `code`. Raises SpecError, and ValueError without a
-    spec.
+    own C. The texts of SHARED_FILES are left out of `code`. Raises SpecError, and ValueError
+    without a spec.
     """
     project, references = to_project(root), to_some_texts(specs, "specs")
     documents = _load_documents(references, project)
@@ -93,7 +95,7 @@ def trace_keys(specs: PathTexts, root: PathText | None = None) -> KeyTraceReport
     found = build_key_traces(expanded_documents, code)
     files = dict.fromkeys(key.place.source.name for key in found.keys)
     every = {name: text for files in code.values() for name, text in files.items()}
-    shown = {name: text for name, text in every.items() if not name.startswith("ha_math")}
+    shown = {name: text for name, text in every.items() if not name.startswith(SHARED_FILES)}
     return KeyTraceReport(found, {name: read_text(Path(name))[1] for name in files}, shown)
 
 

@@ -123,10 +123,22 @@ def command_stub(command: Callable[..., None]) -> Callable[[], None]:
     return stub
 
 
+def _version(is_wanted: bool) -> None:
+    """Print the version and exit if it is wanted."""
+    if is_wanted:
+        from importlib import metadata
+
+        print(f"modewright {metadata.version('modewright')}")
+        raise typer.Exit
+
+
 def options(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="print problems only")] = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="print each step")] = False,
     log_file: Annotated[Path | None, typer.Option(help="append the log to this file")] = None,
+    version: Annotated[  # noqa: ARG001 - its callback prints it
+        bool, typer.Option("--version", help="print the version", is_eager=True, callback=_version)
+    ] = False,
     allow_outside: Annotated[
         bool,
         typer.Option("--allow-outside", help="allow specs to refer to files outside their project"),

@@ -84,9 +84,10 @@ class Workspace:
         """Yield path and document of each valid spec of the project, sorted by path.
 
         These are the YAML files below `spec/` and the open texts, not the specs of the
-        distribution.
+        distribution. Links without a target, also loops of links, are left out.
         """
-        found = {path.resolve() for path in (self.root / "spec").rglob("*.yaml")}
+        files = (self.root / "spec").rglob("*.yaml")
+        found = {path.resolve() for path in files if path.exists()}
         for path in sorted(found | set(self.texts)):
             document = self.document(path)
             if document is not None:

@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from language.text.sanitise import truncate
 from language.text.temporary_files import postpone_signals
 
 DEFAULT_FILE_MODE = 0o644
@@ -24,11 +25,29 @@ class OutputError(Exception):
     """An output cannot be written; the message states which and why."""
 
 
+def resolve_output(path: Path) -> Path:
+    """Return the absolute path of an output without links; it need not exist.
+
+    Raises OutputError if the operating system cannot follow the path: for a loop of links, a name
+    that is too long, a character that no name may have, and a folder that may not be read.
+    """
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        pass
+    except OSError as error:
+        raise OutputError(f"{truncate(str(path))}: {error.strerror}") from None
+    except ValueError:
+        raise OutputError(f"{str(path)!r}: this is no name of a file") from None
+    return path.resolve()
+
+
 def make_folder(folder: Path) -> None:
     """Create a folder and its missing parents; an existing folder is accepted.
 
     Raises OutputError if the path is a file or a broken link, or cannot be created.
     """
+    resolve_output(folder)
     if folder.is_symlink() and not folder.exists():
         raise OutputError(f"{folder}: this is a link to what is not there")
     if folder.exists() and not folder.is_dir():
@@ -49,9 +68,10 @@ def require_writable(*paths: Path | None) -> None:
     for path in paths:
         if path is None:
             continue
-        if path.exists() and path.resolve().suffix in SPEC_SUFFIXES:
+        place = resolve_output(path)
+        if place.exists() and place.suffix in SPEC_SUFFIXES:
             raise OutputError(f"{path}: this is a spec; an output would replace it")
-        if any(_is_result(place) for place in (path.resolve(), path.resolve().parent)):
+        if any(_is_result(one) for one in (place, place.parent)):
             raise OutputError(f"{path}: this is a part of the results of a study")
         require_writable_location(path)
 
@@ -69,11 +89,11 @@ def require_separate_outputs(results: Path, *paths: Path | None) -> None:
     Parts are STUDY_FOLDER_NAMES in the folder `results`; other outputs may be in it, even if it
     does not exist yet. All must also pass `require_writable`. None is skipped.
     """
-    folder, claimed = results.resolve(), set[Path]()
+    folder, claimed = resolve_output(results), set[Path]()
     for path in paths:
         if path is None:
             continue
-        place = path.resolve()
+        place = resolve_output(path)
         if place in claimed:
             raise OutputError(f"{path}: this is the name of two outputs")
         claimed.add(place)
@@ -100,6 +120,7 @@ def require_writable_location(path: Path) -> None:
     a pipe or character device is accepted if it is writable. For a link the folder of its target
     counts. Nothing is created.
     """
+    resolve_output(path)
     if path.is_dir():
         raise OutputError(f"{path}: this is a folder; name a file in it")
     if path.exists() and not path.is_file() and not _is_stream(path):

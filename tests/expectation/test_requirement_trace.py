@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from expectation.requirement_trace import RequirementTrace
 from modewright.api import traceability as traces
-from modewright.api.spec_tests import load_test
+from modewright.api.spec_tests import find_tests, load_test
 from modewright.cli.app import app
 from modewright.render import requirement_trace as show_trace
 from tests.expectation.latch_project import AUTOMATON, HEAD, write_project
@@ -45,6 +45,19 @@ def test_what_is_missing_is_told(found: RequirementTrace) -> None:
     assert show_trace.trace_summary(found) == (
         "5 requirements; 1 untested: L-2; 2 unimplemented: L-5, L-4"
     )
+
+
+def test_shipped_tests_count_for_shipped_specs_in_any_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert traces.trace("ev_driveline").with_state("untested") == []
+    write_project(tmp_path, "met: {event: high}")
+    (own,) = find_tests()
+    assert find_tests(specs=[tmp_path / "spec" / "latch.yaml"]) == [own]
+    shipped = Path(str(load_test("tip_out_is_detected").scenario.span.source.name))
+    assert find_tests(specs=[shipped])[0] == own
+    assert len(find_tests(specs=[shipped])) > 5
 
 
 def test_the_lines_of_c_are_those_that_cite_the_place(found: RequirementTrace) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import get_args
 
+import pytest
 from hypothesis import HealthCheck, Phase, given, note, settings, strategies as st
 
 from language.ir.number_type import NUMBER_TYPES
@@ -37,6 +38,7 @@ def test_interpreter_and_c_agree_on_every_bit(program: Program, inputs: list[Tic
     assert verdict.ticks == len(inputs)
 
 
+@pytest.mark.long
 def test_random_programs_hold_every_kind_of_operation() -> None:
     """What no random program holds, their agreement says nothing about."""
     kinds: set[str] = set()

@@ -131,6 +131,7 @@ def test_what_is_not_understood_is_refused_with_its_place(text: str, told: str) 
     assert str(refused.value).startswith("made.py:2: ") and told in str(refused.value)
 
 
+@pytest.mark.long
 def test_every_module_of_the_tree_can_be_rewritten() -> None:
     names = layout_of(ROOT).names
     for module in names.modules:

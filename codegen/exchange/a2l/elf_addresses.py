@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,6 +24,12 @@ TRANSPARENT_TAGS = (
     "DW_TAG_restrict_type",
 )
 """DWARF tags of types that only qualify or rename another type."""
+MAX_TYPE_CHAIN = 100
+"""Maximum length of a chain of TRANSPARENT_TAGS; a longer one is a cycle of a damaged file."""
+NESTED_ARGUMENTS = re.compile(r"\('([^']*)',")
+"""The begin of a message of pyelftools that is the text of the arguments of another exception."""
+ELF_MAGIC = b"\x7fELF"
+"""The first bytes of an ELF file."""
 DW_OP_ADDR = 0x03
 """The DWARF operation DW_OP_addr, which an address follows."""
 
@@ -83,33 +91,55 @@ def read_image(path: Path, types: tuple[str, ...], string_symbols: tuple[str, ..
     `types` are names of typedefs. Variables with a fixed address are searched, with their members
     and the first MAX_ARRAY_ELEMENTS elements of arrays; a type without a variable has an empty
     tuple. A symbol of `string_symbols` that the file lacks is left out of `strings`; a text ends
-    after 256 characters. Raises ImageError if the file is unreadable, no ELF, or has no debug
-    information; MissingToolError if pyelftools is missing.
+    after 256 characters. Raises ImageError if the file is unreadable, no ELF, damaged, or has no
+    debug information; MissingToolError if pyelftools is missing.
     """
     try:
-        from elftools.common.exceptions import ELFError
         from elftools.elf.elffile import ELFFile
     except ModuleNotFoundError:
         raise MissingToolError(
             "reading an ELF needs pyelftools: pip install 'modewright[elf]'"
         ) from None
     try:
-        with path.open("rb") as file:
+        file = path.open("rb")
+    except OSError as error:
+        raise ImageError(f"{path}: {error.strerror}") from None
+    with file:
+        with _report_damage(path, "its header"):
+            if file.read(len(ELF_MAGIC)) != ELF_MAGIC:
+                raise ImageError(f"{path}: this is not a linked program (ELF)")
             elf = ELFFile(file)
-            if not elf.has_dwarf_info():
-                raise ImageError(f"{path}: it has no debug information; compile with -g")
+            has_debug_information = elf.has_dwarf_info()
+        if not has_debug_information:
+            raise ImageError(f"{path}: it has no debug information; compile with -g")
+        with _report_damage(path, "its debug information"):
             structures = _find_structures(elf, types)
+        with _report_damage(path, "its symbol table"):
             symbols = _symbols(elf)
+        with _report_damage(path, "its constants"):
             strings = {
                 name: _string_at(elf, symbols[name]) for name in string_symbols if name in symbols
             }
-            return Image(path, structures, symbols, strings, elf.little_endian)
-    except OSError as error:
-        raise ImageError(f"{path}: {error.strerror}") from None
-    except (ELFError, KeyError, IndexError, ValueError, AssertionError) as error:
-        if isinstance(error, ImageError):
-            raise
-        raise ImageError(f"{path}: this is not a linked program (ELF): {error}") from None
+        return Image(path, structures, symbols, strings, elf.little_endian)
+
+
+@contextmanager
+def _report_damage(path: Path, part: str) -> Iterator[None]:
+    """Return a context that raises ImageError, which names `part`, for any other exception.
+
+    pyelftools does not check what it reads: a damaged file leads to exceptions of many types, also
+    of the interpreter, such as MemoryError and RecursionError.
+    """
+    try:
+        yield
+    except ImageError:
+        raise
+    except Exception as error:
+        sentences = [text for text in error.args if isinstance(text, str) and " " in text]
+        if sentences and (nested := NESTED_ARGUMENTS.match(sentences[0])):
+            sentences = [nested[1]]
+        reason = f": {sentences[0]}" if sentences else ""
+        raise ImageError(f"{path}: the file is damaged, {part} cannot be read{reason}") from None
 
 
 def _find_structures(elf: ELFFile, types: tuple[str, ...]) -> dict[str, tuple[StructLocation, ...]]:
@@ -138,13 +168,13 @@ def _nested_structures(
 
     Members of structures and up to MAX_ARRAY_ELEMENTS elements of arrays are searched.
     """
-    while kind is not None and kind.tag in TRANSPARENT_TAGS:
-        if kind.tag == "DW_TAG_typedef" and _name_of(kind) in types:
-            structure = _strip_qualifiers(kind)
+    for part in _qualifier_chain(kind):
+        if part.tag == "DW_TAG_typedef" and _name_of(part) in types:
+            structure = _strip_qualifiers(part)
             if structure is not None:
-                yield _name_of(kind), symbol, address, structure
+                yield _name_of(part), symbol, address, structure
             return
-        kind = _type_of(kind)
+    kind = _strip_qualifiers(kind)
     if kind is None:
         return
     if kind.tag == "DW_TAG_structure_type":
@@ -177,19 +207,28 @@ def _struct_fields(structure: DIE) -> Iterator[DIE]:
     return (child for child in structure.iter_children() if child.tag == "DW_TAG_member")
 
 
+def _qualifier_chain(kind: DIE | None) -> Iterator[DIE]:
+    """Yield a type and those that it refers to, as long as they have TRANSPARENT_TAGS.
+
+    Raises ValueError if the type refers to itself, as in a damaged file.
+    """
+    for _ in range(MAX_TYPE_CHAIN):
+        if kind is None or kind.tag not in TRANSPARENT_TAGS:
+            return
+        yield kind
+        kind = _type_of(kind)
+    raise ValueError("a type refers to itself")
+
+
 def _strip_qualifiers(kind: DIE | None) -> DIE | None:
     """Return a type without qualifiers and typedefs; None for `void`."""
-    while kind is not None and kind.tag in TRANSPARENT_TAGS:
-        kind = _type_of(kind)
-    return kind
+    chain = [*_qualifier_chain(kind)]
+    return _type_of(chain[-1]) if chain else kind
 
 
 def _is_const(kind: DIE | None) -> bool:
     """Tell whether a type is `const` and not `volatile`."""
-    tags = []
-    while kind is not None and kind.tag in TRANSPARENT_TAGS:
-        tags.append(kind.tag)
-        kind = _type_of(kind)
+    tags = [part.tag for part in _qualifier_chain(kind)]
     return "DW_TAG_const_type" in tags and "DW_TAG_volatile_type" not in tags
 
 
@@ -229,9 +268,9 @@ def _declaration_of(die: DIE) -> DIE:
 
 
 def _name_of(die: DIE) -> str:
-    """Return the name of a DIE; an empty text if it has none."""
+    """Return the name of a DIE in ASCII, other bytes as `\\xe4`; an empty text if it has none."""
     name = die.attributes.get("DW_AT_name")
-    return name.value.decode() if name else ""
+    return name.value.decode("ascii", "backslashreplace") if name else ""
 
 
 def _offset_of(member: DIE) -> int:

@@ -33,11 +33,21 @@ def dbc(
     from modewright.api import code_generation as code
 
     require_writable(out)
+    identifier = _identifier_of(first)
     try:
         text = code.dbc(
-            automaton, int(first, 0), values_of(sets), None, calibrations or (), is_fd=is_fd
+            automaton, identifier, values_of(sets), None, calibrations or (), is_fd=is_fd
         )
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--first") from None
     write_files({out: text.encode("ascii")})
     report_written_files([out])
+
+
+def _identifier_of(text: str) -> int:
+    """Return the whole number of --first. Raises BadParameter for another text."""
+    try:
+        return int(text, 0)
+    except ValueError:
+        label = f"`{text}` is not a whole number such as `0x320` or `800`"
+        raise typer.BadParameter(label, param_hint="--first") from None

@@ -41,7 +41,7 @@ def diff(
     if as_json:
         print(json.dumps(diff_json(changes), indent=2))
     else:
-        print(diff_text(changes), end="")
+        print(diff_text(changes) or "no differences\n", end="")
     if html:
         write_files({html: diff_html(changes, before, after).encode()})
         if not as_json:

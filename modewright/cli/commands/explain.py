@@ -52,6 +52,7 @@ def explain(
     elif as_json:
         print(json.dumps(explaining.spec_json(spec), indent=2))
     elif other:
-        print(explaining.compare_specs(spec, other, stage, values), end="")  # type: ignore[arg-type]
+        differences = explaining.compare_specs(spec, other, stage, values)  # type: ignore[arg-type]
+        print(differences or "no differences\n", end="")
     else:
         print(explaining.explain_spec(spec, stage, values), end="")  # type: ignore[arg-type]

@@ -22,9 +22,7 @@ def fit(
     train: Train,
     parameters: Annotated[
         str | None,
-        typer.Option(
-            "--parameters", help="parameters to fit: 'k_hs,c_hs'; by default all with a range"
-        ),
+        typer.Option("--parameters", help="parameters to fit: 'k,c'; by default all with a range"),
     ] = None,
     mapping: Map = None,
     out: Annotated[

@@ -98,15 +98,19 @@ def _relabel_source(node: YamlNode, folder: str, revision: str) -> YamlNode:
 def _extract_revision(reference: str, revision: str, folder: Path) -> None:
     """Write the specs of a revision below the working folder into a folder.
 
-    Raises SpecError if Git does not know the revision, MissingToolError without Git.
+    Raises SpecError if Git does not know the revision, MissingToolError without Git. A text that
+    begins with `-` is no revision: Git would read it as an option.
     """
+    place = Span(Source("command line", (reference,)), 1, 1, max(1, len(revision)))
+    if revision.startswith("-"):
+        label = f"`{revision}` is no revision of Git: it begins with `-`"
+        raise SpecError([Problem("name", place, label, "like `HEAD~1:room`")])
     try:
         command = [require_tool("git"), "archive", "--format=tar", revision, "--", "*.yaml"]
         data = subprocess.run(command, capture_output=True, check=True).stdout
     except (OSError, subprocess.CalledProcessError) as error:
         output = getattr(error, "stderr", b"") or str(error).encode()
         first = (output.decode("utf-8", errors="replace").splitlines() or ["no answer"])[0]
-        place = Span(Source("command line", (reference,)), 1, 1, len(revision))
         raise SpecError(
             [Problem("name", place, f"Git has no `{revision}` here: {first}")]
         ) from None

@@ -81,6 +81,7 @@ def test_what_is_not_a_number_has_no_border() -> None:
     )
 
 
+@pytest.mark.long
 @pytest.mark.skipif(
     not shutil.which(COVERAGE_EXPORTER), reason="no llvm-cov-19: make system-packages"
 )

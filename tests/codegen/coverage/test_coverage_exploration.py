@@ -69,6 +69,7 @@ def test_seeds_find_the_same_ways_each_time() -> None:
     assert set(ways) > set(generate_corpus(slow(), RANGES, 5_000, (1,)))
 
 
+@pytest.mark.long
 def test_the_ways_of_a_large_program_are_short(monkeypatch: pytest.MonkeyPatch) -> None:
     """So many ticks are gone in C, and as many are looked at for borders."""
     assert exploring.max_entry_ticks(program_named("hko")) == exploring.MAX_LARGE_TICKS

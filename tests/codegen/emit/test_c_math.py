@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import math
 import random
+import subprocess
+from pathlib import Path
 
 import pytest
 
+from codegen.emit.c_expression import MATH_SUFFIX
+from codegen.emit.c_module import emit_c_files
+from codegen.toolchain.compiler import FLAGS, WARNINGS, find_compiler
+from language.ir.number_type import NUMBER_TYPES, NumberType
 from language.numerics.evaluate import ELEMENTARY, Scalar, apply_function
 from language.numerics.function_table import FUNCTIONS
 from lockstep.comparison import compare
@@ -26,6 +32,13 @@ parameters:
     table:
       over: [u, v]
       points: {-1: {-2: 1, 0: 0.3}, 0: {-2: 4, 0: -7}, 1.5: {-2: 0.1, 0: 0.2}}
+  bent: {tunable: true, table: {over: u, points: {-1: 3, 0: -0.0, 2: 0.7}}}
+  sheet:
+    tunable: true
+    table:
+      over: [u, v]
+      points:
+        {-1: {-2: 1, 0: 0.3, 1: 2}, 0: {-2: 4, 0: -7, 1: 9}, 1.5: {-2: 0.1, 0: 0.2, 1: -0.7}}
 inputs: {u: {unit: "1"}, v: {unit: "1"}, w: {unit: "1"}}
 equations:
   s: sin(u * 1 rad)
@@ -45,10 +58,12 @@ equations:
   raised: pow(u, v)
   along: lookup(curve, u)
   over: lookup(plane, u, v)
+  bend: lookup(bent, u)
+  height: lookup(sheet, u, v)
 modes: {only: {}}
 outputs:
   [s, c, e, t, log_u, size, root, least, most, limited, direction, whole, slope, heading,
-    raised, along, over]
+    raised, along, over, bend, height]
 """
 SIGNALS = {"sin": "s", "cos": "c", "exp": "e", "tanh": "t", "abs": "size", "sqrt": "root"}
 SIGNALS |= {"floor": "whole", "tan": "slope", "log": "log_u"}
@@ -90,7 +105,8 @@ def tape(tmp_path_factory: pytest.TempPathFactory) -> TickLog:
 
 
 def test_every_function_has_the_same_bits_in_c(tape: TickLog) -> None:
-    verdict = compare(tape)
+    """A warning of the compiler is an error here: tunable tables keep their qualifiers."""
+    verdict = compare(tape, (*FLAGS, "-Werror"))
     assert verdict.ticks == POINTS
     assert verdict.is_equal, str(verdict.first)
 
@@ -112,3 +128,23 @@ def test_no_function_of_the_language_is_left_out() -> None:
     """`pow2`, `real` and `whole` are not written in specs: other lock-steps compare them."""
     called = {name for name in (*FUNCTIONS, *ELEMENTARY) if f"{name}(" in SPEC}
     assert called == {*FUNCTIONS, *ELEMENTARY} - {"pow2", "real", "whole", "lookup2"}
+
+
+@pytest.mark.parametrize("number", NUMBER_TYPES)
+def test_tunable_tables_compile_without_warnings(number: NumberType, tmp_path: Path) -> None:
+    """The header of their lookups is written only for a module that reads such a table."""
+    spec = tmp_path / "functions.yaml"
+    spec.write_text(SPEC.replace("float64", number))
+    files = emit_c_files(program(str(spec)))
+    header = f"ha_page{MATH_SUFFIX[number]}.h"
+    assert f'#include "{header}"' in files["functions.c"]
+    assert "lookup(axis_curve_1, 5, cal->curve," in files["functions.c"].replace(
+        "lookupf", "lookup"
+    )
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    command = [*find_compiler(), *FLAGS, *WARNINGS, "-Werror", "-c", "functions.c"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    spec.write_text(SPEC.replace("float64", number).replace("tunable: true", "range: [-9, 9]"))
+    assert header not in emit_c_files(program(str(spec)))

@@ -34,6 +34,7 @@ def test_the_flags_that_define_the_bits_are_in_it() -> None:
     assert "ha_math" not in emit_cmake_file(program("contactor"))[CMAKE_FILE]
 
 
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="no cmake: make system-packages")
 def test_cmake_builds_and_installs_it_and_a_project_of_a_user_takes_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

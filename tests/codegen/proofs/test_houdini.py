@@ -76,6 +76,7 @@ def test_of_a_chart_much_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     assert {"memory.count_of_log", "work.tail", "work.turn"} <= counts
 
 
+@pytest.mark.long
 def test_a_question_that_takes_too_long_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reach, "EFFORT", 100_000)
     made = run_c_passes(program_named("supervisor"))

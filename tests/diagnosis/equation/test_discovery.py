@@ -108,6 +108,7 @@ def test_an_order_of_a_torque_is_written_with_a_phase_for_each_recording(bench: 
     assert formula.phases["ph_1_half_shaft"] == pytest.approx((0.4, -1.0))
 
 
+@pytest.mark.long
 def test_a_friction_without_a_name_becomes_its_formula(
     bench: ModelSet, monkeypatch: pytest.MonkeyPatch
 ) -> None:

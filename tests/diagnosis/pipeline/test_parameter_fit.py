@@ -61,6 +61,7 @@ def test_only_those_named_move_and_the_calibration_is_a_spec(
     ("words", "told"),
     [
         (["--parameters", "J,bb"], "command line:1:1: error: `spinner` has no parameter `bb`"),
+        (["--parameters", "quark"], "help: parameters that can be fitted: "),
         (["--parameters", "J,,b"], "`J,,b` has an empty name"),
         (["--parameters", "J,b,J"], "`J` is named twice"),
         (["--out", "rig.txt"], "rig.txt: a calibration ends with .yaml"),

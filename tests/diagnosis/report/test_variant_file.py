@@ -29,6 +29,7 @@ TOGETHER = (
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ids", TOGETHER, ids=", ".join)
 def test_a_variant_with_three_effects_is_the_same_in_c(
     tmp_path: Path, ids: tuple[str, ...]

@@ -80,7 +80,8 @@ def test_anything_else_is_none(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["main", "MAIN", "math", "nul", "COM1", "lpt9", "ha_math", "signal", "Limits"]
+    "name",
+    ["main", "MAIN", "math", "nul", "COM1", "lpt9", "ha_math", "ha_page", "signal", "Limits"],
 )
 def test_an_automaton_is_not_named_like_another_file(name: str) -> None:
     problems = Problems()

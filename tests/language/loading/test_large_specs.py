@@ -40,6 +40,7 @@ def test_a_chain_that_reads_twice_costs_no_more_than_its_length(tmp_path: Path) 
     assert time.monotonic() - start < LONGEST
 
 
+@pytest.mark.long
 def test_a_chain_of_a_thousand_derived_parameters_needs_no_stack(tmp_path: Path) -> None:
     names = "\n".join(f"  p_{k}: {{derived: p_{k + 1} + 1}}" for k in range(1000))
     text = automaton(["e_0: p_0 + x"], f"parameters:\n{names}\n  p_1000: {{value: 1}}\n")

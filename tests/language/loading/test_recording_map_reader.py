@@ -159,3 +159,13 @@ def test_another_kind_is_no_map() -> None:
     document_ = read_document(SHIPPED.path_of("driveline"))
     (problem,) = raised_problems(lambda: read_map(document_, SHIPPED))
     assert problem.label == "`driveline` is an automaton, not a map"
+
+
+@pytest.mark.parametrize(
+    "more",
+    ['dbc: "a\\0b.dbc"', 'dbc: [a.dbc, "b\\n.dbc"]', 'windows: {"a\\e[31m.csv": [[0 s, 1 s]]}'],
+)
+def test_a_file_name_with_a_control_character_is_refused(more: str) -> None:
+    (line,) = problem_lines(lambda: some(more=more))
+    assert line.startswith("5:")
+    assert "a file name has no control character, like U+" in line

@@ -298,3 +298,20 @@ def test_the_shipped_manoeuvre_is_that_of_the_paper() -> None:
     assert steps(scenario, "T_req") == pairs((0, 30), (Fraction(4785, 10**4), -20))
     assert scenario.horizon == Fraction(5, 2)
     assert scenario.initial["plant.w_w"] == Fraction(40000, 3600) / Fraction(29, 100)
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ('"a\\0b.csv"', "a file name has no control character, like U+0000 here"),
+        ('"a\\tb.csv"', "a file name has no control character, like U+0009 here"),
+        ("''", "`file` names no file"),
+    ],
+)
+def test_a_recording_without_a_valid_file_name_is_refused_at_its_place(
+    system: System, name: str, reason: str
+) -> None:
+    mapping = "time: {column: t, unit: s}, columns: {u: {to: u, unit: km/h}}"
+    more = f"recording: {{file: {name}, {mapping}}}\n"
+    lines = problem_lines(lambda: run(system, inputs="", more=more))
+    assert any(reason in line for line in lines), lines

@@ -55,6 +55,24 @@ def test_a_file_is_found_by_the_name_of_what_it_holds(tmp_path: Path) -> None:
     assert project.path_of("ball") == tmp_path / "spec" / "file.yaml"
 
 
+def test_only_the_first_head_of_a_file_names_it(tmp_path: Path) -> None:
+    scenario = "language: 1\nscenario: {name}\nof: ball\n"
+    wrong = "language: 1\nstudy: many\nscenario: {name}\nof: ball\n"
+    project = project_of(
+        tmp_path,
+        z_scenario=scenario.format(name="kick"),
+        a_study=wrong.format(name="kick"),
+        b_study=wrong.format(name="tip_out").replace("many", "more"),
+        c_study=wrong.format(name="nowhere_else").replace("many", "other"),
+    )
+    assert project.path_of("kick").name == "z_scenario.yaml"
+    assert project.path_of("tip_out") == SHIPPED.path_of("tip_out")
+    assert project.path_of("many").name == "a_study.yaml"
+    assert project.path_of("nowhere_else").name == "c_study.yaml"
+    (line,) = problem_lines(lambda: extended(project, "many"))
+    assert line.endswith("one file holds one thing: `study` is given too")
+
+
 def test_a_file_is_found_in_any_folder_below_spec(tmp_path: Path) -> None:
     project = project_of(tmp_path)
     (tmp_path / "spec" / "a" / "b").mkdir(parents=True)

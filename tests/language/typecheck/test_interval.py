@@ -11,7 +11,7 @@ from language.expressions.syntax_tree import SyntaxTree
 from language.ir.ops import Ref
 from language.lowering.expressions import lower_expression
 from language.numerics.evaluate import evaluate
-from language.typecheck.interval import UNBOUNDED, Interval
+from language.typecheck.interval import UNBOUNDED, Interval, inverse_power
 from language.typecheck.range_analysis import RangeAnalysis
 from tests.language.spec_builders import tree
 
@@ -48,6 +48,48 @@ def test_every_value_lies_in_the_interval(text: str, a: float, b: float) -> None
     value = evaluate(lower_expression(tree(text), {"a": Ref("a"), "b": Ref("b")}), {"a": a, "b": b})
     slack = 1e-9 * max(1.0, abs(float(value)))
     assert interval.low - slack <= value <= interval.high + slack
+
+
+EXTREMES = st.one_of(
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.sampled_from([0.0, 5e-324, 1e-310, 1e-200, 1e-50, 1.0, 1e50, 1e200, 1.7e308]).flatmap(
+        lambda size: st.sampled_from([size, -size])
+    ),
+)
+
+
+@given(st.lists(EXTREMES, min_size=3, max_size=3), EXTREMES, st.integers(-8, 8), st.booleans())
+def test_extreme_bounds_hold_every_value(
+    numbers: list[float], other: float, exponent: int, is_certain: bool
+) -> None:
+    """Also where a power or a quotient is too large or too small for a double."""
+    low, a, high = sorted(numbers)
+    ranges = {"a": Interval(low, high, is_certain), "b": Interval(other, other, is_certain)}
+    power = f"a^{exponent}" if exponent else "a"
+    for text in (power, f"b / {power}", f"{power} / a", f"b * {power}", f"b - {power} + a"):
+        analysis = RangeAnalysis(ranges.__getitem__, lambda name: UNBOUNDED)
+        interval = analysis.analyse(tree(text))
+        lowered = lower_expression(tree(text), {"a": Ref("a"), "b": Ref("b")})
+        value = float(evaluate(lowered, {"a": a, "b": other}))
+        slack = max(5e-324, 1e-9 * abs(value)) if math.isfinite(value) else 0.0
+        assert not math.isnan(interval.low) and not math.isnan(interval.high)
+        if not math.isnan(value):
+            assert interval.low - slack <= value <= interval.high + slack, (text, interval, value)
+
+
+def test_a_power_that_underflows_gives_no_bound() -> None:
+    found = inverse_power(Interval(1e-50, 1.0, True), 8)
+    assert (found.low, found.high, found.is_certain) == (1.0, math.inf, True)
+    found = inverse_power(Interval(-1.0, -1e-200, True), 3)
+    assert (found.low, found.high) == (-math.inf, -1.0)
+
+
+def test_a_divisor_without_values_that_ends_at_zero_gives_no_bound() -> None:
+    """Where a condition is never true, the lower bound is above the upper one."""
+    ranges = {"a": Interval(-5.0, 0.0, True)}
+    analysis = RangeAnalysis(ranges.__getitem__, lambda name: UNBOUNDED)
+    assert analysis.analyse(tree("if a > 3 then 1 / a else 2")).high >= 2.0
+    assert analysis.analyse(tree("if a > 3 then a^-3 else 2")).high >= 2.0
 
 
 @pytest.mark.parametrize(

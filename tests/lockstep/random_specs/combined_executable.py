@@ -15,8 +15,10 @@ from language.ir.program import Program
 from lockstep.comparison import Verdict, compare_output
 from lockstep.tick_log import TickLog
 
-FLAGS = (*flags_at_level("O1"), "-w")
-QUICK = (*flags_at_level("O0"), "-w")
+ERRORS = ("-Werror=discarded-qualifiers", "-Werror=incompatible-pointer-types")
+"""Warnings that are errors: what they name has no defined behaviour. Others are not asked for."""
+FLAGS = (*flags_at_level("O1"), *ERRORS)
+QUICK = (*flags_at_level("O0"), *ERRORS)
 """Where a difference has to be seen that an optimiser has no part in."""
 SECONDS = 300
 MAIN = "int main(void)"

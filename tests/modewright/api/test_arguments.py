@@ -129,8 +129,10 @@ def test_a_single_text_is_one_item(run: mw.Trajectory, tmp_path: Path) -> None:
         (lambda run: mw.check("room", root="README.md"), "not README.md: this is no folder"),
         (lambda run: run.events_of("nope"), "room, thermostat"),
         (lambda run: run.events_of("thermostatt"), "did you mean `thermostat`"),
+        (lambda run: run.plot("x.*"), r"no signal matches `x\.\*`: the signals are room\.T, "),
         (lambda run: mw.check_recordings([]), "`files` is empty"),
         (lambda run: mw.diagnose("room", []), "`train` is empty"),
+        (lambda run: mw.diagnose("room", "x.csv", held_out=""), "`held_out` has an empty name"),
         (lambda run: mw.fit("room", []), "`train` is empty"),
         (lambda run: mw.fit("room", "x.csv", []), "`parameters` is empty"),
         (lambda run: mw.trace([]), "`specs` is empty"),
@@ -160,6 +162,17 @@ def test_a_wrong_choice_names_the_choices(
 def test_a_title_is_a_text(run: mw.Trajectory, title: object) -> None:
     with pytest.raises(TypeError, match="`title` is a text, not"):
         mw.plot(run, title=title)  # type: ignore[arg-type]
+
+
+def test_a_scenario_of_another_system_is_named_with_its_system(folder: Path) -> None:
+    with pytest.raises(SpecError) as caught:
+        mw.simulate("warm_room", "tip_out", root=folder)
+    (problem,) = caught.value.problems
+    label = "`tip_out` is a scenario of `ev_driveline`, not of `warm_room`"
+    assert (problem.kind, problem.label) == ("form", label)
+    assert problem.help == (
+        "with `warm_room`: `plant.w_w` is not a state of an instance of `warm_room`"
+    )
 
 
 def test_an_instance_without_events_has_none(run: mw.Trajectory) -> None:

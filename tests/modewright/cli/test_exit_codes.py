@@ -102,6 +102,13 @@ def test_an_output_that_cannot_be_written_is_1_before_any_work(tmp_path: Path) -
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.fixture
+def empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working folder without a project."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -114,15 +121,11 @@ def test_an_output_that_cannot_be_written_is_1_before_any_work(tmp_path: Path) -
     ],
 )
 def test_a_folder_without_specs_is_1(
-    arguments: tuple[str, ...],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    arguments: tuple[str, ...], empty_folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     assert run(*arguments) == 1
     assert re.search("there is no (spec|test) below", "".join(capsys.readouterr()))
-    assert list(tmp_path.iterdir()) == []
+    assert list(empty_folder.iterdir()) == []
 
 
 @pytest.mark.parametrize(
@@ -134,13 +137,12 @@ def test_a_folder_without_specs_is_1(
         ("plot", "ev_driveline:tip_out", "--out", "a.gif"),
     ],
 )
+@pytest.mark.usefixtures("empty_folder")
 def test_a_picture_of_another_format_is_1_before_any_work(
     arguments: tuple[str, ...],
-    tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("CC", "no-such-compiler")
     assert run(*arguments) == 1
     assert "a.gif: a picture ends with .png, .svg, .pdf" in capsys.readouterr().err
@@ -197,6 +199,7 @@ def test_a_defect_of_ours_is_4_with_a_report(
     report.unlink()
 
 
+@pytest.mark.long
 def test_an_interrupt_is_130() -> None:
     code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
     code += "import sys; sys.argv = ['modewright', 'demo', '--out', 'build'];"

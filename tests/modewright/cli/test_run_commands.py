@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from importlib import metadata
 from pathlib import Path
 
 import pytest
 
+from modewright.api import doctor
 from modewright.cli.app import app
 from modewright.cli.common.exit_codes import run_with_exit_code
 
@@ -80,3 +82,29 @@ def test_a_figure_of_nothing_is_refused(
     assert run("plot", "run.csv", *options) == code
     assert told in capsys.readouterr().err.replace("\n", " ")
     assert not (tmp_path / "plot.png").exists()
+
+
+def test_equal_specs_have_no_differences(capsys: pytest.CaptureFixture[str]) -> None:
+    for arguments in (
+        ("diff", "estimator", "estimator"),
+        ("explain", "estimator", "estimator"),
+        ("explain", "estimator", "estimator", "--pass", "model"),
+    ):
+        assert run(*arguments) == 0
+        assert capsys.readouterr().out == "no differences\n"
+
+
+def test_the_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("--version") == 0
+    assert capsys.readouterr().out == f"modewright {metadata.version('modewright')}\n"
+
+
+def test_an_identifier_that_is_no_number_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("dbc", "supervisor", "--first", "abc", "--out", "a.dbc") == 2
+    assert "`abc` is not a whole number such as `0x320`" in capsys.readouterr().err
+
+
+def test_a_dependency_of_several_extras_is_checked_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = ["pyarrow>=1; extra == 'a'", "numpy", "pyarrow>=1; extra == 'b'"]
+    monkeypatch.setattr(metadata, "requires", lambda name: lines)
+    assert [check.name for check in doctor._check_dependencies()] == ["pyarrow", "numpy"]

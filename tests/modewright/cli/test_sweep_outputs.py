@@ -92,6 +92,7 @@ def test_blocks_of_no_variants_are_wrong_use_of_the_api() -> None:
     assert not Path("o").exists()
 
 
+@pytest.mark.long
 def test_warnings_of_a_study_are_told(capsys: pytest.CaptureFixture[str]) -> None:
     path = Path("spec/study_grid.yaml")
     path.write_text(path.read_text().replace("{random: 4, seed: 3}", "{sobol: 3}"))

@@ -156,7 +156,7 @@ def test_parameters_of_the_model_are_compared_with_what_is_laid_over_them() -> N
 def test_the_exit_code_says_whether_something_differs_where_it_is_asked_for() -> None:
     run = CliRunner().invoke
     assert run(app, ["diff", "driveline", "driveline", "--exit-code"]).exit_code == 0
-    assert run(app, ["diff", "driveline", "driveline"]).output == ""
+    assert run(app, ["diff", "driveline", "driveline"]).output == "no differences\n"
     assert run(app, ["diff", "driveline", "driveline_load"]).exit_code == 0
     assert run(app, ["diff", "driveline", "driveline_load", "--exit-code"]).exit_code == 1
 
@@ -186,6 +186,12 @@ def test_a_spec_is_compared_with_what_it_was_in_a_revision(
     assert same.exit_code == 0
     refused = CliRunner().invoke(app, ["diff", "nowhere:more", "more"])
     assert "Git has no `nowhere` here" in str(refused.exception)
+    written = tmp_path / "written"
+    for option in (f"--output={written}", "--remote=.", "-o", "--"):
+        refused = CliRunner().invoke(app, ["diff", "--", f"{option}:more", "more"])
+        assert isinstance(refused.exception, SpecError)
+        assert f"`{option}` is no revision of Git" in str(refused.exception)
+    assert not written.exists()
 
 
 def test_without_git_a_revision_is_answered_with_the_line_that_installs_it(

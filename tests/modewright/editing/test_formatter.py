@@ -47,6 +47,12 @@ def test_every_spec_here_says_the_same_and_a_second_pass_changes_nothing() -> No
         assert format_text(made) == made, path
 
 
+def test_the_shipped_specs_are_laid_out_by_the_rules() -> None:
+    paths = sorted((ROOT / "spec").rglob("*.yaml"))
+    texts = {path: path.read_text("utf-8") for path in paths}
+    assert [path for path, text in texts.items() if format_text(text, str(path)) != text] == []
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_a_spec_that_was_shaken_says_the_same_and_is_laid_out_once_and_for_all(seed: int) -> None:
     chance = random.Random(seed)

@@ -100,3 +100,12 @@ def test_what_the_server_needs_is_told_where_it_is_absent(monkeypatch: pytest.Mo
     monkeypatch.setitem(sys.modules, "pygls.exceptions", None)
     with pytest.raises(MissingToolError, match=r"pip install 'modewright\[lsp\]'"):
         lsp()
+
+
+def test_a_loop_of_links_is_no_document_of_the_project(tmp_path: Path) -> None:
+    (tmp_path / "spec").mkdir()
+    (tmp_path / "spec" / "here.yaml").write_text("language: 1\nautomaton: here\n")
+    (tmp_path / "spec" / "loop.yaml").symlink_to("back.yaml")
+    (tmp_path / "spec" / "back.yaml").symlink_to("loop.yaml")
+    found = [path.name for path, _ in Workspace(tmp_path).documents()]
+    assert found == ["here.yaml"]

@@ -24,6 +24,7 @@ from tests.sweep.example_studies import QUICK_EXECUTOR, make_study
 DESIGN = ("sampling: {random: 4, seed: 3}", "sampling: {morris: 6, seed: 3}")
 
 
+@pytest.mark.long
 def test_a_study_is_one_page_that_asks_for_no_other_file(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -11,9 +11,12 @@ from pathlib import Path
 
 import pytest
 
+from modewright.cli.app import app
 from modewright.runtime.output_files import (
     OutputError,
+    make_folder,
     require_calibration_output,
+    require_separate_outputs,
     require_writable,
     write_files,
 )
@@ -111,3 +114,41 @@ def test_a_socket_is_no_place_for_an_output(tmp_path: Path) -> None:
         bound.bind(str(tmp_path / "s"))
         with pytest.raises(OutputError, match="this is a device or a socket"):
             require_writable(tmp_path / "s")
+
+
+@pytest.mark.parametrize("name", ["loop", "loop/x.csv", "n" * 300, "a\0b"])
+def test_a_path_that_cannot_be_followed_is_no_output(name: str, tmp_path: Path) -> None:
+    """A loop of links, a name that is too long, and a character that no name may have."""
+    (tmp_path / "loop").symlink_to(tmp_path / "back")
+    (tmp_path / "back").symlink_to(tmp_path / "loop")
+    path = tmp_path / name
+    for check in (
+        require_writable,
+        require_calibration_output,
+        make_folder,
+        require_separate_outputs,
+        lambda path: require_separate_outputs(tmp_path, path),
+    ):
+        with pytest.raises(OutputError, match=r"links|too long|no name of a file"):
+            check(path)
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["back", "loop"]
+
+
+def test_commands_refuse_a_loop_of_links_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "loop").symlink_to("back")
+    (tmp_path / "back").symlink_to("loop")
+    (tmp_path / "here.yaml").write_text(
+        "language: 1\nautomaton: here\nperiod: 1 ms\nnumbers: float64\n"
+    )
+    lines = [
+        *("schema -o loop", "dbc here.yaml -o loop/x", "a2l here.yaml -o loop"),
+        *("generate here.yaml -o loop", "fmu here.yaml -o loop/x.fmu", "--log-file loop schema"),
+        *("diff here.yaml here.yaml --html loop", "check here.yaml --sarif loop"),
+        *("graph here.yaml -o loop/x.svg", "simulate here.yaml -s none -o loop/x.csv"),
+    ]
+    for line in lines:
+        with pytest.raises(OutputError, match="loop"):
+            app(line.split(), standalone_mode=False)

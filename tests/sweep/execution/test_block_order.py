@@ -98,6 +98,7 @@ def cluster_of(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> DaskExecutor:
     return DaskExecutor(desk, answer_quickly)
 
 
+@pytest.mark.long
 @settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(size=st.integers(1, 60), threads=st.integers(1, 9), seed=st.randoms(use_true_random=False))
 def test_rows_depend_on_no_worker_no_block_size_and_no_order(

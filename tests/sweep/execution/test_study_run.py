@@ -206,6 +206,7 @@ serve_blocks(run)
 """
 
 
+@pytest.mark.long
 def test_a_dead_worker_is_replaced_and_what_ends_every_worker_is_left_out(tmp_path: Path) -> None:
     """The first block that is computed kills its worker once, the block of 12 variants always."""
     made = make_study()

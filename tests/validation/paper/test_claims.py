@@ -76,6 +76,7 @@ def with_brake(folder: Path, seen: str) -> tuple[float, float]:
     return float(np.sqrt(np.mean(wrong**2))), float(slope)
 
 
+@pytest.mark.long
 def test_chatter_stops_and_a_start_on_the_coast_side_is_found(tmp_path: Path) -> None:
     spec = tmp_path / "spec"
     shutil.copytree(ROOT / "spec" / "ev_driveline", spec)

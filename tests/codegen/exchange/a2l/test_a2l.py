@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import errno
+import re
 import shutil
 import struct
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pya2l.model as model
 import pytest
+from hypothesis import HealthCheck, given, settings, strategies as st
 
+from codegen.exchange.a2l import elf_addresses
 from codegen.exchange.a2l.description import describe_module
 from codegen.exchange.a2l.elf_addresses import ImageError
 from codegen.exchange.a2l.writer import ModuleLocation, _unique_name, emit_a2l, locate_module
@@ -55,6 +61,13 @@ modes: {run: {}}
 outputs: [T]
 """
 AUTOMATA = ("estimator_simple", "supervisor", "driveline")
+
+
+@pytest.fixture(scope="module")
+def whole_program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The contactor linked with its main, for this machine."""
+    used = shipped("contactor")
+    return link_program(used, describe_module(used), tmp_path_factory.mktemp("whole"))
 
 
 def text_of(used: Program, elf: Path | None = None) -> str:
@@ -227,6 +240,51 @@ def test_what_is_no_program_is_refused(tmp_path: Path) -> None:
     for other in ("nothing", "."):
         with pytest.raises(ImageError):
             locate_module(used, tmp_path / other)
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_a_damaged_program_is_refused_or_read(whole_program: Path, data: st.DataObject) -> None:
+    """Whatever pyelftools raises, a user reads that the file is damaged, and where."""
+    torn = bytearray(whole_program.read_bytes())
+    for _ in range(data.draw(st.integers(1, 40))):
+        torn[data.draw(st.integers(4, len(torn) - 1))] = data.draw(st.integers(0, 255))
+    used, file = shipped("contactor"), whole_program.with_name("torn")
+    file.write_bytes(torn)
+    try:
+        emit_a2l(used, locate_module(used, file)).encode("ascii")
+    except ImageError as error:
+        assert re.match(rf"{re.escape(str(file))}: .* .* .*", str(error), re.DOTALL), error
+
+
+@pytest.mark.parametrize(
+    ("failure", "reason"),
+    [
+        (MemoryError(), ""),
+        (OSError(errno.EINVAL, "Invalid argument"), ": Invalid argument"),
+        (OverflowError("cannot fit 'int'"), ": cannot fit 'int'"),
+        (KeyError(48), ""),
+        (RecursionError(), ""),
+    ],
+)
+def test_what_cannot_be_read_of_a_damaged_program_is_named(
+    failure: Exception, reason: str, whole_program: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*arguments: object) -> None:
+        raise failure
+
+    monkeypatch.setattr("codegen.exchange.a2l.elf_addresses._find_structures", fail)
+    with pytest.raises(ImageError) as refused:
+        locate_module(shipped("contactor"), whole_program)
+    label = "the file is damaged, its debug information cannot be read"
+    assert str(refused.value) == f"{whole_program}: {label}{reason}"
+
+
+def test_a_type_that_refers_to_itself_is_damage(monkeypatch: pytest.MonkeyPatch) -> None:
+    circle = SimpleNamespace(tag="DW_TAG_typedef")
+    monkeypatch.setattr("codegen.exchange.a2l.elf_addresses._type_of", lambda kind: kind)
+    with pytest.raises(ValueError, match="a type refers to itself"):
+        elf_addresses._strip_qualifiers(cast(Any, circle))
 
 
 def test_another_layout_is_told(tmp_path: Path) -> None:

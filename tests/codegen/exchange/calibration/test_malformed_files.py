@@ -236,6 +236,7 @@ def test_a_page_is_written_where_it_can_be(out: str) -> None:
     assert run_command("export", "kinds_float64", "--out", "page", "--format", "xls") == 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("form", ["dcm", "cdfx", "csv"])
 def test_a_page_with_random_damage_is_a_page_or_is_told(form: str, root: Path) -> None:
     whole = export_calibration("kinds_float64").text(form).encode()
