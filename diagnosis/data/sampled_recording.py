@@ -192,30 +192,49 @@ def resample(
 def share_period(
     series: Sequence[SampledRecording], period: Fraction | None = None
 ) -> tuple[SampledRecording, ...]:
-    """Return recordings with one period, where they differ by the rounding of stamps alone.
+    """Return recordings with one period: the given one [s], or the longest of the recordings.
 
-    The period is the given one [s], or that of the recording with most samples. A recording keeps
-    its own period if its last sample would move by more than `MAX_SHARED_SLIP` of a period.
+    Periods that differ by the rounding of stamps alone count as equal, see `MAX_SHARED_SLIP`; of
+    these the one of the recording with most samples is taken. Other recordings are interpolated.
     """
     if period is None:
-        period = max(series, key=lambda one: one.count).period
+        different: list[Fraction] = []
+        for one in sorted(series, key=lambda one: -one.count):
+            if not any(_has_period(one, known) for known in different):
+                different.append(one.period)
+        period = max(different)
     return tuple(
         dataclasses.replace(one, period=period)
-        if abs(one.period - period) * one.count <= MAX_SHARED_SLIP * period
-        else one
+        if _has_period(one, period)
+        else interpolate(one, period)
         for one in series
     )
 
 
-def require_equal_periods(series: Sequence[SampledRecording]) -> None:
-    """Raise ValueError if the recordings do not all have the same period.
+def _has_period(series: SampledRecording, period: Fraction) -> bool:
+    """Return whether the last sample moves by at most `MAX_SHARED_SLIP` with another period."""
+    return abs(series.period - period) * series.count <= MAX_SHARED_SLIP * period
 
-    The message names the last recording of each period, with its rate.
+
+def interpolate(series: SampledRecording, period: Fraction) -> SampledRecording:
+    """Return a recording at another period [s], with signals linear between its samples.
+
+    Samples next to an unknown value (NaN) are unknown. The last sample is not after that of
+    `series`.
     """
-    rates = {one.period: f"{one.name} ({float(1 / one.period):g} Hz)" for one in series}
-    if len(rates) > 1:
-        named = ", ".join(rates.values())
-        raise ValueError(f"recordings at different rates cannot be diagnosed together: {named}")
+    count = int((series.count - 1) * series.period / period) + 1
+    places = np.arange(count) * float(period / series.period)
+    before = np.minimum(places.astype(np.intp), max(series.count - 2, 0))
+    after = np.minimum(before + 1, series.count - 1)
+    part = (places - before)[:, np.newaxis]
+
+    def at_places(values: Reals) -> Reals:
+        step = np.where(part > 0.0, part * (values[after] - values[before]), 0.0)
+        return np.ascontiguousarray(values[before] + step)
+
+    return dataclasses.replace(
+        series, period=period, inputs=at_places(series.inputs), measured=at_places(series.measured)
+    )
 
 
 def decimate(

@@ -2,27 +2,73 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from fractions import Fraction
 
+import numpy as np
+
+from language.expressions.syntax_tree import NumberLiteral, SyntaxTree
+from language.expressions.units import NO_UNIT
+from language.lowering.constants import constant_values, parameter_constants
+from language.lowering.linearisation import (
+    LinearisationPoint,
+    inline_equations,
+    symbolic_jacobian,
+    symbolic_rates,
+)
 from language.model.automaton import Automaton
 from language.programs.continuous_program import stable_step_limits
+from language.text.diagnostic import Problems, SpecError
 
 STEP_RATE_PRODUCT = Fraction(1, 2)
 """Largest |eigenvalue| times step; the relative error of an RK4 step is then 0.5^5 / 120 = 3e-4."""
 SHORTEST_STEP = Fraction(1, 10**6)
 """Shortest step [s], whatever the eigenvalues are."""
+NEARLY_ZERO = Fraction(1, 10**12)
+"""Value [SI] of all variables at rest."""
 
 
 def time_resolution(automaton: Automaton, longest: Fraction) -> Fraction:
     """Return the longest step [s] that follows the fastest damped component of a model.
 
     It is `STEP_RATE_PRODUCT` over the largest magnitude of an eigenvalue at the declared
-    parameters, over all modes, at most `longest` and at least `SHORTEST_STEP`. Sampled automata and
-    exponential methods give `longest`.
+    parameters, over all modes, at most `longest` and at least `SHORTEST_STEP`. The eigenvalues are
+    those of the affine terms, and those of the tangent at rest: a smooth friction is steepest
+    there. Sampled automata and exponential methods give `longest`.
     """
     if automaton.is_sampled:
         return longest
     rates = [abs(limit.eigenvalue) for limit in stable_step_limits(automaton)]
-    fastest = Fraction(max(rates, default=0.0)).limit_denominator(10**6)
+    fastest = Fraction(max([*rates, rate_at_rest(automaton)])).limit_denominator(10**6)
     step = STEP_RATE_PRODUCT / fastest if fastest else longest
     return max(min(step, longest), SHORTEST_STEP)
+
+
+def rate_at_rest(automaton: Automaton) -> float:
+    """Return the largest magnitude [1/s] of a damped eigenvalue where all variables are about 0.
+
+    The flow of each mode is differentiated where they are `NEARLY_ZERO`, beside the corner of an
+    absolute value. Modes without a derivative are left out; 0 if no component is damped.
+    """
+    values = constant_values(parameter_constants(automaton, Problems()))
+    rest: dict[str, SyntaxTree] = {
+        name: NumberLiteral(NEARLY_ZERO, NO_UNIT, declared.span)
+        for section in (automaton.states, automaton.inputs, automaton.discrete)
+        for name, declared in section.items()
+    }
+    point = LinearisationPoint(automaton, values, rest)
+    fastest = 0.0
+    for mode in automaton.modes.values():
+        with suppress(SpecError, KeyError, ArithmeticError):
+            rates = symbolic_rates(mode, inline_equations(mode, {}))
+            slopes = symbolic_jacobian(rates, tuple(rates), point)
+            names = list(rates)
+            matrix = np.zeros((len(names), len(names)))
+            for row, entries in slopes.items():
+                for column, slope in entries.items():
+                    matrix[names.index(row), names.index(column)] = point.evaluator(slope)
+            if np.all(np.isfinite(matrix)) and matrix.size:
+                eigenvalues = np.linalg.eigvals(matrix)
+                damped = np.abs(eigenvalues[eigenvalues.real < 0.0])
+                fastest = max(fastest, float(np.max(damped, initial=0.0)))
+    return fastest

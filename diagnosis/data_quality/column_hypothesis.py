@@ -21,7 +21,6 @@ from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import (
     SampledRecording,
     compared_outputs,
-    require_equal_periods,
     resample,
     sample_windows,
     share_period,
@@ -108,7 +107,7 @@ def find_clock_and_sign_errors(
     The findings are errors of kind `sign` or `clock_offset`, those of `find_column_errors`. A
     window with too few samples (`sample_windows`, `decimate`), or without a value of an input, is
     left out. None is returned if no window remains, if the model does not compile or no C compiler
-    works, if the recordings have different rates, or if the model cannot be linearised.
+    works, or if the model cannot be linearised.
     """
     seen = compared_outputs(mapping, automaton)
     sampled: list[SampledRecording] = []
@@ -126,7 +125,6 @@ def find_clock_and_sign_errors(
     drifts = balance_disturbances(document, automaton)
     model_set = ModelSet(document, project, automaton, (), tuple(series), seen, drifts)
     try:
-        require_equal_periods(series)
         found = find_column_errors(model_set.compile_candidate(()), series)
     except (SpecError, MissingToolError, BuildError, ValueError, OSError):
         return None

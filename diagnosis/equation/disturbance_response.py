@@ -20,7 +20,7 @@ from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.data.stacked_recordings import burn_in_samples, stack_recordings
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.model_set import ModelSet
-from diagnosis.localisation.reference_magnitude import DISTURBANCE_KIND_BY_SECTION
+from diagnosis.estimation.place_magnitude import DISTURBANCE_KIND_BY_SECTION
 from diagnosis.model.candidate import Candidate, compile_candidate
 from diagnosis.model.placed_effect import DISTURBANCE_STATE, PlacedEffect, disturbance_effect
 from language.expressions.syntax_tree import Name

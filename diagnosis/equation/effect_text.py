@@ -12,8 +12,8 @@ from diagnosis.data.array_types import Reals
 from diagnosis.equation.disturbance_response import element_torques
 from diagnosis.equation.term_library import LibraryTerm
 from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.place_magnitude import disturbance_unit
 from diagnosis.estimation.quantity import Quantity
-from diagnosis.localisation.reference_magnitude import disturbance_unit
 from diagnosis.model.placed_effect import PlacedEffect
 from language.expressions.units import Dimension, dimension_product, parse_unit
 from language.overlays.effect_reader import external_names, read_effect

@@ -15,8 +15,8 @@ from diagnosis.equation.forward_regression import RegressionProblem, TermColumns
 from diagnosis.equation.term_library import LibraryTerm, Signals, generate_terms
 from diagnosis.estimation.estimate import Estimate, with_normal_equations
 from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.place_magnitude import place_bindings
 from diagnosis.localisation.correlate import angle_rates
-from diagnosis.localisation.reference_magnitude import place_bindings
 from language.expressions.units import Dimension
 from language.overlays.name_types import TreeTypes, format_si_unit
 

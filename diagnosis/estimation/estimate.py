@@ -97,16 +97,21 @@ def evaluate(
     """Return a candidate at a point, with Kalman gains for its operating points.
 
     The operating points are those of the prediction `nearby`. Without it, a first prediction with
-    gains for the initial state gives the operating points for the final gains; the first one is
-    kept if it diverges. The gains are computed with the values of the first recording. The cost is
+    gains for the initial state gives the operating points for the final gains, or a simulation if
+    that prediction diverges: a machine that starts at rest may have another gain once it moves. The
+    gains are computed with the values of the first recording. The cost is
     infinite if a run diverges. The estimate has no normal equations.
     """
     values = values_at(candidate, point, 0)
     gains = kalman_gains(candidate, series, values, noise_levels, nearby)
     prediction = predict_at(candidate, series, point, gains, noise_levels)
-    if nearby is None and prediction.is_complete:
-        gains = kalman_gains(candidate, series, values, noise_levels, prediction)
-        prediction = predict_at(candidate, series, point, gains, noise_levels)
+    if nearby is None:
+        seen = prediction
+        if not seen.is_complete:
+            seen = predict_at(candidate, series, point, gains.without_correction, noise_levels)
+        if seen.is_complete:
+            gains = kalman_gains(candidate, series, values, noise_levels, seen)
+            prediction = predict_at(candidate, series, point, gains, noise_levels)
     cost = prediction.negative_log_likelihood() + point.prior_cost(candidate)
     return Estimate(candidate, point, cost, prediction, gains, noise_levels)
 

@@ -50,6 +50,11 @@ class KalmanGains:
     transient: Reals
     steady_state: Reals
 
+    @property
+    def without_correction(self) -> KalmanGains:
+        """Gains of 0: a simulation."""
+        return KalmanGains(np.zeros_like(self.transient), np.zeros_like(self.steady_state))
+
 
 @dataclass(frozen=True)
 class PredictionResult:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -12,7 +13,12 @@ from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.checkpoint import NO_CACHE, FitCache
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.model.candidate import Candidate, compile_candidate
-from diagnosis.model.placed_effect import PlacedEffect, disturbance_effect, find_placements
+from diagnosis.model.placed_effect import (
+    PlacedEffect,
+    disturbance_effect,
+    find_placements,
+    place_path,
+)
 from language.expressions.units import parse_unit
 from language.model.automaton import Automaton
 from language.overlays.effect_place import PlaceMismatch, find_effect_place
@@ -22,8 +28,8 @@ from language.text.diagnostic import SpecError
 from language.text.document import Document, MappingNode
 
 FitFunction = Callable[[], Estimate]
-FORCE_DIMENSIONS = (parse_unit("N*m").dimension.powers, parse_unit("N").dimension.powers)
-"""Dimensions of the balances that get a disturbance; the filter of a sensor has another one."""
+NO_STORAGE = (parse_unit("1").dimension.powers, parse_unit("s").dimension.powers)
+"""Dimensions of the coefficient of der(x) without a storage: a position, the filter of a sensor."""
 EXCLUDED_EFFECTS = ("unknown_input", "sensor_quantisation")
 """Effects that are no candidates: one is detected as a disturbance, one only adds noise."""
 
@@ -32,7 +38,8 @@ EXCLUDED_EFFECTS = ("unknown_input", "sensor_quantisation")
 class ModelSet:
     """A base automaton, recordings with a common period, and the effects that may be placed on it.
 
-    `disturbances` are the disturbances that every candidate has by default.
+    `disturbances` are the disturbances that every candidate has by default. `scales` are the
+    magnitudes [SI] of places by their paths; without them effects have those of SI units.
     """
 
     document: Document
@@ -43,6 +50,7 @@ class ModelSet:
     output_names: tuple[str, ...]
     disturbances: tuple[PlacedEffect, ...]
     fit_cache: FitCache = NO_CACHE
+    scales: Mapping[str, Mapping[str, Fraction]] = field(default_factory=dict, repr=False)
     _compiled: dict[tuple[str, ...], Candidate] = field(default_factory=dict, repr=False)
 
     def load_or_fit(
@@ -90,14 +98,15 @@ class ModelSet:
         """Yield every effect at every place where the recordings could show it.
 
         `EXCLUDED_EFFECTS` are left out, as are inputs that are constant in every recording, outputs
-        that are not compared, and balances of other units than forces or torques. The order is that
+        that are not compared, and balances of no storage. The order is that
         of `effects`, then of the places. Whether the model compiles with an effect is not checked.
         """
         candidates = (one for one in self.effects if one.name not in EXCLUDED_EFFECTS)
         for effect in candidates:
             for placed_effect in find_placements(self.document, effect):
                 if self._is_applicable(placed_effect):
-                    yield placed_effect
+                    scales = self.scales.get(place_path(placed_effect), {})
+                    yield dataclasses.replace(placed_effect, scales=scales)
 
     def try_compile(self, placed_effects: Sequence[PlacedEffect]) -> Candidate | None:
         """Return the base with effects, or None if they cannot be combined (SpecError).
@@ -122,8 +131,8 @@ class ModelSet:
     def _is_applicable(self, placed_effect: PlacedEffect) -> bool:
         """Return whether recordings can show an effect at its place.
 
-        An input must vary in a recording, an output must be compared, and a balance must be one of
-        forces or torques.
+        An input must vary in a recording, an output must be compared, and a balance must be that of
+        a storage, such as a mass or a heat capacity.
         """
         name = placed_effect.place
         if name in self.automaton.inputs:
@@ -133,28 +142,28 @@ class ModelSet:
             name in self.automaton.states
             and placed_effect.effect.place_patterns[0].kind == "balance"
         ):
-            return _is_force_balance(self.document, name)
+            return _is_storage_balance(self.document, name)
         if placed_effect.effect.place_patterns[0].kind == "output":
             return name in self.output_names
         return True
 
 
 def balance_disturbances(document: Document, automaton: Automaton) -> tuple[PlacedEffect, ...]:
-    """Return a disturbance for each state with a balance of forces or torques, in their order.
-
-    The balance must match the place of a disturbance effect and be in units of N or N*m.
-    """
+    """Return a disturbance for each state with the balance of a storage, in their order."""
     return tuple(
         disturbance_effect("balance", name)
         for name in automaton.states
-        if _is_force_balance(document, name)
+        if _is_storage_balance(document, name)
     )
 
 
-def _is_force_balance(document: Document, name: str) -> bool:
-    """Return whether the state `name` has a flow balance in units of force or torque."""
+def _is_storage_balance(document: Document, name: str) -> bool:
+    """Return whether the state `name` has a balance in which der(x) has a coefficient with a unit:
+    a mass, an inertia, a heat capacity, an inductance, but not a time.
+    """
     place = find_effect_place(document.root, disturbance_effect("balance", name).effect, name)
     flow = document.root.get("flow")
     if isinstance(place, PlaceMismatch) or not isinstance(flow, MappingNode):
         return False
-    return parse_unit(str(place.holes["force"])).dimension.powers in FORCE_DIMENSIONS
+    unit = place.holes.get("inertia_unit")
+    return unit is not None and parse_unit(str(unit)).dimension.powers not in NO_STORAGE

@@ -14,8 +14,8 @@ from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.data.stacked_recordings import burn_in_samples
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.place_magnitude import acting_rms
 from diagnosis.localisation.correlate import find_correlates
-from diagnosis.localisation.reference_magnitude import acting_rms
 from diagnosis.localisation.smoother import smooth_states
 from diagnosis.model.placed_effect import DISTURBANCE_STATE, PlacedEffect
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.place_magnitude import disturbance_unit
 from diagnosis.localisation.cause import balance_of
 from diagnosis.localisation.location import Location
-from diagnosis.localisation.reference_magnitude import disturbance_unit
 
 PLACE_PHRASES = {
     "flow": "in the balance of",

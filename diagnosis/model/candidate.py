@@ -149,7 +149,8 @@ def compile_candidate(
     """
     all_layers = [*placed_effects, *disturbances]
     parts = [
-        f"{placed_effect.id} {placed_effect.suffix} {node_text(placed_effect.effect.body)}"
+        f"{placed_effect.id} {placed_effect.suffix} {placed_effect.scales} "
+        f"{node_text(placed_effect.effect.body)}"
         for placed_effect in all_layers
     ]
     counts = f"{len(placed_effects)} effects, {len(disturbances)} disturbances"

@@ -10,19 +10,22 @@ from fractions import Fraction
 import numpy as np
 from matplotlib.figure import Figure
 
-from diagnosis.model.parameter import free_parameters_of
+from diagnosis.model.parameter import declared_value, free_parameters_of
 from diagnosis.model.placed_effect import (
     PlacedEffect,
     automaton_with_effects,
     effect_names,
+    round_scale,
 )
 from engine.results.mode_band import PALETTE
 from engine.results.plot import Picture
 from engine.results.trajectory import Trajectory
 from engine.simulation.simulate import simulate
+from language.expressions.number_literal import parse_quantity_literal
 from language.loading.scenario_reader import read_scenario
 from language.loading.system_reader import single_instance_system
 from language.model.automaton import Automaton
+from language.overlays.effect_place import EffectPlace, find_effect_place
 from language.overlays.expand_document import Project
 from language.overlays.name_types import format_si_unit
 from language.text.diagnostic import Source
@@ -62,20 +65,44 @@ def simulate_signature(
 
     `step` is an input and its height with unit; by default the input of the effect's place, or the
     first input without a default, or the first one, by `DEFAULT_STEP_HEIGHTS`. The input steps to
-    the negative height at 1 s and back at 2.5 s; inputs without a default are 0. A parameter of the
-    effect whose value is neutral takes the last start value of a fit. Raises SpecError, and
+    the negative height at 1 s and back at 2.5 s; inputs without a default are 0. The magnitudes of
+    the place are those of the step and of the base. A parameter of the effect whose value is
+    neutral takes the last start value of a fit. Raises SpecError, and
     ValueError if the base has no input or not that of `step`.
     """
     base = automaton_with_effects(document, project, ())
     name, height = step or _default_step(base, placed_effect)
     if name not in base.inputs:
         raise ValueError(f"`{base.name}` has no input `{name}`: {', '.join(base.inputs)}")
-    whole, values = _with_visible_effect(
-        automaton_with_effects(document, project, (placed_effect,)), placed_effect
-    )
     text = _scenario_text(base, name, height)
-    runs = [_simulate(one, project, text) for one in (base, whole)]
-    return Signature(placed_effect, f"{name} = {height}", values, *runs)
+    without = _simulate(base, project, text)
+    size = abs(float(parse_quantity_literal(height.removeprefix("-"), base.span).value))
+    scales = _place_scales(document, base, placed_effect, without, size)
+    scaled = dataclasses.replace(placed_effect, scales=scales)
+    whole, values = _with_visible_effect(
+        automaton_with_effects(document, project, (scaled,)), placed_effect
+    )
+    return Signature(
+        placed_effect, f"{name} = {height}", values, without, _simulate(whole, project, text)
+    )
+
+
+def _place_scales(
+    document: Document, base: Automaton, placed_effect: PlacedEffect, run: Trajectory, step: float
+) -> dict[str, Fraction]:
+    """Return the magnitudes [SI] of a place: `step` is the load, states give rate and stretch."""
+    place = find_effect_place(document.root, placed_effect.effect, placed_effect.place)
+    holes = place.holes if isinstance(place, EffectPlace) else {}
+    texts = {key: value for key, value in holes.items() if isinstance(value, str)}
+    found = {"load": step, "level": step, "time": 1.0, "period": 0.005, "horizon": float(HORIZON)}
+    states = {"rate": texts.get("x") or texts.get("speed") or texts.get("angle_rate", "")}
+    states["stretch"] = texts.get("twist", "")
+    for name, state in states.items():
+        signal = run.signals.get(f"{base.name}.{state}")
+        if signal is not None:
+            found[name] = float(np.sqrt(np.mean(np.asarray(signal, float) ** 2)))
+    found["inertia"] = declared_value(base, texts.get("inertia", "")) or 0.0
+    return {name: round_scale(value) for name, value in found.items() if value > 0.0}
 
 
 def _default_step(base: Automaton, placed_effect: PlacedEffect) -> tuple[str, str]:

@@ -10,9 +10,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from language.expressions.parser import parse_expression
+from language.lowering.constants import evaluate_exactly
 from language.model.automaton import Automaton
-from language.model.declaration import Parameter
+from language.model.declaration import Formula, Parameter
 from language.overlays.name_types import format_si_unit
+from language.text.diagnostic import SpecError
+from language.text.document import ScalarNode
 
 PRIOR_STD = 0.15
 """Prior standard deviation of a base parameter: of its logarithm, or as a fraction of its range."""
@@ -135,3 +139,17 @@ def si_unit(parameter: Parameter) -> str:
     unit = parameter.unit
     is_si = unit.factor == 1 and unit.offset == 0
     return unit.text if is_si else format_si_unit(unit.dimension)
+
+
+def declared_value(automaton: Automaton, text: str) -> float | None:
+    """Return the value [SI] of a formula of numbers and parameters, as they are declared.
+
+    None for an empty text and for another formula.
+    """
+    if not text:
+        return None
+    scalar = ScalarNode(text, automaton.span)
+    try:
+        return float(evaluate_exactly(Formula(parse_expression(scalar), text), automaton))
+    except SpecError:
+        return None

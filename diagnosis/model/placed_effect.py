@@ -8,8 +8,9 @@ is missing (Kristensen, Madsen, Jorgensen 2004).
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
 from importlib import resources
 from pathlib import Path
@@ -61,13 +62,23 @@ MAX_STEPS = 40
 """Most major steps between two samples."""
 
 
+def round_scale(value: float) -> Fraction:
+    """Return 1 or 3 times the power of ten that is nearest to a positive value in its logarithm."""
+    half_decades = round(2.0 * math.log10(value))
+    return Fraction(10) ** (half_decades // 2) * (3 if half_decades % 2 else 1)
+
+
 @dataclass(frozen=True)
 class PlacedEffect:
-    """An effect at a place; names that it adds to the automaton end with `_` and `suffix`."""
+    """An effect at a place; names that it adds to the automaton end with `_` and `suffix`.
+
+    `scales` are the magnitudes of the place [SI], of which its parameters may be multiples.
+    """
 
     effect: Effect
     place: str
     suffix: str
+    scales: Mapping[str, Fraction] = field(default_factory=dict, compare=False)
 
     @property
     def id(self) -> str:
@@ -136,7 +147,13 @@ def overlay_effects(document: Document, placed_effects: Sequence[PlacedEffect]) 
     span = Span(Source("diagnosis"), 1, 1)
     for placed_effect in placed_effects:
         application = EffectApplication(
-            placed_effect.effect, placed_effect.place, placed_effect.suffix, {}, {}, span
+            placed_effect.effect,
+            placed_effect.place,
+            placed_effect.suffix,
+            {},
+            {},
+            span,
+            placed_effect.scales,
         )
         root = apply_effect(root, application, problems)
         problems.raise_if_errors()

@@ -50,8 +50,8 @@ class DiagnosisDecision:
 def decide(case: Case, full_rate_set: ModelSet, log: LogCallback) -> DiagnosisDecision:
     """Return the decision on a case.
 
-    A base that forgets its initial state is simulated over whole recordings; any other one predicts
-    each sample from those before it.
+    Models predict each sample from those before it. A base that forgets its initial state is
+    simulated over whole recordings first; where no effect explains that, prediction decides.
     """
     model_set, base = fit_base(full_rate_set, log)
     locations = localise(model_set, base)
@@ -60,11 +60,13 @@ def decide(case: Case, full_rate_set: ModelSet, log: LogCallback) -> DiagnosisDe
         log("the base forgets its initial state: whole recordings are simulated")
         found = fit_output_error(full_rate_set, base)
         selection = select_effects(found.model_set, found.base, case.thresholds, log)
-        model_set = dataclasses.replace(model_set, series=found.model_set.series)
-        outcome = _outcome_of(selection, model_set)
-        return DiagnosisDecision(
-            model_set, found.base, selection, locations, outcome, case.thresholds
-        )
+        if selection.accepted:
+            model_set = dataclasses.replace(model_set, series=found.model_set.series)
+            outcome = _outcome_of(selection, model_set)
+            return DiagnosisDecision(
+                model_set, found.base, selection, locations, outcome, case.thresholds
+            )
+        log("no effect explains the simulations: each sample is predicted from those before it")
     selection = select_effects(model_set, base, case.thresholds, log)
     selection, locations = detect_unknown_input(model_set, selection, locations, log)
     outcome, equation = _outcome_of(selection, model_set), None

@@ -12,11 +12,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.estimation.place_magnitude import disturbance_unit
 from diagnosis.experiment.discrimination import ExperimentPlan
 from diagnosis.localisation.cause import balance_of
 from diagnosis.localisation.location import SIGNIFICANT_STDS, DisturbanceEstimate, Location
 from diagnosis.localisation.location_text import PLACE_PHRASES
-from diagnosis.localisation.reference_magnitude import disturbance_unit
 from diagnosis.report import report_text as sentences
 from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.model_comparison import ModelComparison

@@ -69,8 +69,8 @@ def compare_candidates(
     """Return the comparison of effects beside a base.
 
     No candidate is fitted if free disturbances show that the base leaves less than `least_energy`.
-    A base that is fitted by simulation without an observer has no free disturbance; there the noise
-    of the signals is the floor.
+    A base that is fitted by simulation has no free disturbance. Its floor is the noise of the
+    signals; beside accepted effects it is the best fit, so effects are compared with each other.
     """
     is_simulated = base.noise_levels.is_output_error
     places = () if is_simulated else disturbance_locations(model_set, base)
@@ -85,6 +85,8 @@ def compare_candidates(
     found = search_candidates(model_set, base, placed_effects, start, log)
     fits = [one.estimate for one in found if one.estimate is not None]
     floor = least_variances([base, *free.values(), *fits])
+    if is_simulated and not base.candidate.placed_effects:
+        floor = np.minimum(floor, base.noise_levels.outputs**2)
     best = min([base, *fits], key=lambda one: one.cost)
     correlation = integrated_autocorrelation(best, model_set.series)
     recordings = len(model_set.series)

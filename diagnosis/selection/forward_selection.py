@@ -111,7 +111,7 @@ def select_effects(
         if best is None or best.share < MIN_SHARE:
             break
         found = _accept(model_set, found, best, log)
-    return replace(found, rivals=_rivals(first, found.accepted[0]))
+    return replace(found, rivals=_rivals(model_set, first, found.accepted[0]))
 
 
 def tolerated_energy(first: Round) -> float:
@@ -126,8 +126,8 @@ def _best_candidate(
 ) -> CandidateFit | None:
     """Return the candidate with the largest gain, None if it does not gain its threshold.
 
-    Of the candidates that explain enough, the first one is taken that also explains enough of what
-    is wrong in free simulations (`simulated_shares`).
+    Of the candidates that explain enough, it is the first one that also explains enough of what is
+    wrong in free simulations.
     """
     enough = [
         one for one in compared.candidates if one.gain >= thresholds.threshold_of(one.placed_effect)
@@ -135,9 +135,17 @@ def _best_candidate(
     explaining = [one for one in enough if one.share >= MIN_SHARE]
     if not explaining:
         return next(iter(enough), None)
-    shares = simulated_shares(model_set, compared.base, explaining)
-    pairs = zip(explaining, shares, strict=True)
-    return next((one for one, share in pairs if share >= MIN_SHARE), explaining[0])
+    simulating = _explain_simulations(model_set, compared, explaining)
+    return next(iter(simulating), explaining[0])
+
+
+def _explain_simulations(
+    model_set: ModelSet, compared: Round, candidates: Sequence[CandidateFit]
+) -> list[CandidateFit]:
+    """Return the candidates that explain enough of what is wrong in free simulations."""
+    shares = simulated_shares(model_set, compared.base, candidates)
+    pairs = zip(candidates, shares, strict=True)
+    return [one for one, share in pairs if share >= MIN_SHARE]
 
 
 def simulated_shares(
@@ -196,9 +204,13 @@ def _select_pair(
     return found
 
 
-def _rivals(compared: Round, accepted: CandidateFit) -> tuple[CandidateFit, ...]:
+def _rivals(
+    model_set: ModelSet, compared: Round, accepted: CandidateFit
+) -> tuple[CandidateFit, ...]:
     """Return the candidates besides the accepted one that belong to the smallest set of hypotheses
     with a probability of `SET_PROBABILITY` (0.95); `other` counts as a hypothesis.
+
+    If the accepted effect explains the free simulations, its rivals do so as well.
     """
     fits = {one.placed_effect.id: one for one in compared.candidates}
     probabilities = candidate_probabilities(compared)
@@ -209,4 +221,5 @@ def _rivals(compared: Round, accepted: CandidateFit) -> tuple[CandidateFit, ...]
         total += probability
         if name in fits and name != accepted.placed_effect.id:
             rivals.append(fits[name])
-    return tuple(rivals)
+    simulating = _explain_simulations(model_set, compared, [accepted, *rivals])
+    return tuple(one for one in rivals if one in simulating or accepted not in simulating)

@@ -12,13 +12,14 @@ from functools import partial
 
 import numpy as np
 
-from diagnosis.data.sampled_recording import SampledRecording, require_equal_periods, resample
+from diagnosis.data.sampled_recording import SampledRecording, resample
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.initial_input import average_initial_inputs, choose_initial_inputs
 from diagnosis.estimation.innovations import measured_noise_levels
 from diagnosis.estimation.levenberg_marquardt import estimate_parameters
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.estimation.noise_level import HUBER_STDS, ORDINARY_LEVEL, disturbance_units
+from diagnosis.estimation.place_scale import with_scales
 from diagnosis.localisation.disturbance_state_fit import free_disturbance
 from diagnosis.model.candidate import Candidate
 
@@ -33,7 +34,7 @@ def fit_base(model_set: ModelSet, log: LogCallback = lambda text: None) -> Fitte
     `ORDINARY_LEVEL` (0.1 units); these levels are held. Inputs are linear or constant between
     samples, whichever costs less with the best free disturbance of a balance. Huber limits are
     `HUBER_STDS` (4) robust standard deviations of the innovations of a first fit without limits.
-    Raises ValueError if the rates of the recordings differ or the model cannot be linearised.
+    Raises ValueError if the model cannot be linearised.
     """
     by_hold = [_fit_with_hold(model_set, is_linear) for is_linear in (True, False)]
     paced, first = min(by_hold, key=_flexible_cost)
@@ -43,13 +44,12 @@ def fit_base(model_set: ModelSet, log: LogCallback = lambda text: None) -> Fitte
     base = paced.load_or_fit("base", first.candidate, [first.point, noise_levels], fit)
     text = "linear between samples" if paced.series[0].is_first_order_hold else "held"
     log(f"base fitted, inputs {text}: {base.cost:.0f} nats")
-    return paced, base
+    return with_scales(paced, base), base
 
 
 def _fit_with_hold(model_set: ModelSet, is_linear: bool) -> FittedBase:
     """Return the model set with one inter-sample behaviour and a first fit of the base."""
     series = resample(model_set.series, model_set.automaton, model_set.output_names, is_linear)
-    require_equal_periods(series)
     averaged = tuple(average_initial_inputs(one) for one in series)
     paced = dataclasses.replace(model_set, series=averaged)
     candidate = paced.compile_candidate(())

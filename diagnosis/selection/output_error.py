@@ -17,6 +17,7 @@ from diagnosis.data.sampled_recording import SampledRecording, resample
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.levenberg_marquardt import estimate_parameters
 from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.place_scale import with_scales
 
 INITIAL_SHIFT = 0.01
 """How far states are moved at the start, as a part of their ranges."""
@@ -84,4 +85,5 @@ def fit_output_error(full_rate_set: ModelSet, base: Estimate) -> OutputErrorFit:
             OutputErrorFit(own, estimate_parameters(candidate, series, noise_levels, start))
             for start in starts
         ]
-    return min(found, key=lambda one: one.base.cost)
+    best = min(found, key=lambda one: one.base.cost)
+    return OutputErrorFit(with_scales(best.model_set, best.base), best.base)

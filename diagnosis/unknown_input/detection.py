@@ -35,6 +35,8 @@ MAX_ACTIVE_FRACTION = 0.22
 """Largest part of all samples that these are, for an input that acts in windows."""
 NEAR_BEST_FRACTION = 0.9
 """Part of the largest gain of a place from which another one may be that of the input."""
+MAX_EXPLAINED_SHARE = 0.5
+"""Share of the remainder that an effect explains above which the remainder is no separate input."""
 MAX_CORRELATION = 0.6
 """Correlation with a known quantity above which a disturbance is no unknown input."""
 MAX_INPUT_DEPENDENCE = 0.4
@@ -52,11 +54,14 @@ def detect_unknown_input(
     """Return the selection with an unknown input, and the locations with its time course.
 
     It is tried where the model with the accepted effects leaves more than an ordinary disturbance:
-    at the balances whose free disturbances gain most. It comes first if no effect was accepted,
-    else behind the effects. Both arguments are returned if the disturbance does not act in windows.
+    at the balances whose free disturbances gain most. It is not tried where an effect explains more
+    than half of what is left: that is no independent input. It comes first if no effect was
+    accepted, else behind the effects. Both arguments are returned if the disturbance does not act
+    in windows.
     """
     effects = _unknown_input_effects(model_set)
-    if selection.last.is_ordinary or not effects:
+    explained = max((one.share for one in selection.last.candidates if one.gain > 0.0), default=0.0)
+    if selection.last.is_ordinary or explained > MAX_EXPLAINED_SHARE or not effects:
         return selection, tuple(locations)
     remaining = localise(model_set, selection.model) if selection.accepted else tuple(locations)
     place = _find_place(model_set, remaining, effects)

@@ -23,6 +23,7 @@ from language.overlays.effect_edits import (
 )
 from language.overlays.effect_place import EffectPlace, Hole, PlaceMismatch, find_effect_place
 from language.overlays.effect_reader import ADDED_SECTIONS, EffectApplication, added_names
+from language.overlays.effect_scale import scale_parameters
 from language.overlays.name_types import formula_entries
 from language.overlays.parameter_override import set_parameter_value
 from language.text.diagnostic import Problems, Source, Span, suggest_name
@@ -92,7 +93,7 @@ class _EffectApplier:
         overlay = Source(source.name, source.lines, application.overlay_name, application.span)
         body = replace_source(application.effect.body, overlay)
         assert isinstance(body, MappingNode)
-        self.body = body
+        self.body = scale_parameters(body, application.scales, application.values)
         self.private_names = self._choose_private_names()
         self._check_holes()
         problems.raise_if_errors()

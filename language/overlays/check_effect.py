@@ -7,6 +7,7 @@ from collections.abc import Collection
 
 from language.expressions.syntax_tree import FunctionCall, SyntaxTree, children
 from language.expressions.units import NO_UNIT, UNKNOWN_UNIT
+from language.overlays.effect_scale import QUANTITY_KEYS, remove_scale
 from language.readers.base_reader import Reader
 from language.readers.parameter_reader import ParameterReader
 from language.text.diagnostic import Problems, Span, suggest_name
@@ -20,8 +21,6 @@ KEY_HOLE_SECTIONS = ("terms", "equations", "redirect", "move")
 """Sections whose keys may be holes."""
 UNIT_SECTIONS = ("parameters", "states", "discrete")
 """Sections of declarations whose unit may be a hole."""
-QUANTITY_KEYS = ("value", "range", "neutral", "plain", "starts")
-"""Keys of a parameter whose values are quantities in its unit."""
 
 
 def check_holes(tree: MappingNode, holes: Collection[str], problems: Problems) -> None:
@@ -85,7 +84,7 @@ def check_parameters(tree: MappingNode, problems: Problems) -> None:
     """
     known = tree.get("parameters")
     if isinstance(known, MappingNode):
-        checkable = {entry.key: _remove_hole_unit(entry) for entry in known}
+        checkable = {entry.key: _remove_hole_unit(remove_scale(entry, problems)) for entry in known}
         tree = put_node(
             tree,
             ("parameters",),

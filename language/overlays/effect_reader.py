@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from fractions import Fraction
 
 from language.expressions.name_rules import check_name
 from language.expressions.parser import parse_balance, parse_expression
@@ -102,7 +103,10 @@ class Effect:
 
 @dataclass(frozen=True)
 class EffectApplication:
-    """An entry of `effects`: an effect with a place, a suffix, new names and values."""
+    """An entry of `effects`: an effect with a place, a suffix, new names and values.
+
+    `scales` are the magnitudes of the place [SI] from recordings, see `effect_scale`.
+    """
 
     effect: Effect
     place: str
@@ -110,6 +114,7 @@ class EffectApplication:
     rename: Mapping[str, Entry]
     values: Mapping[str, Entry]
     span: Span
+    scales: Mapping[str, Fraction] = field(default_factory=dict)
 
     @property
     def place_span(self) -> Span:

@@ -12,7 +12,7 @@ from language.readers.lookup_table_reader import LookupTableReader, section_of
 from language.text.diagnostic import Problems
 from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
 
-FITTING_KEYS = ("neutral", "plain", "starts", "per", "form")
+FITTING_KEYS = ("neutral", "plain", "starts", "per", "form", "scale")
 FIT_FORMS = ("constant", "constant_or_random_walk")
 FitScope = Literal["model", "recording"]
 FitForm = Literal["constant", "constant_or_random_walk"]
@@ -79,6 +79,9 @@ class ParameterReader(Reader):
             self.problems.error("range", value_node.span, label)
         if type_ == "int":
             limits = self.check_integer_range(limits, table.get("range"))
+        if "scale" in table.entries:
+            label = "only a parameter of an effect has a scale"
+            self.problems.error("form", table.entries["scale"].span, label)
         fitting = self._read_fitting(table, unit, limits)
         common = (entry.key, kind, unit, value, derived, limits, key, entry.span)
         return Parameter(*common, fitting, type_, values, about=table.text_of("about"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from fractions import Fraction
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from diagnosis.data.sampled_recording import (
     SampledRecording,
     decimate,
     grid_period,
-    require_equal_periods,
+    interpolate,
     sample_recording,
     share_period,
     simplest_fraction,
@@ -164,23 +165,37 @@ def test_recordings_whose_stamps_are_rounded_share_the_period_of_the_longest() -
     exact, rounded = Fraction(1, 400), Fraction(100_001, 40_000_000)
     shared = share_period([recording("a", rounded, 500), recording("b", exact, 4000)])
     assert [one.period for one in shared] == [exact, exact]
-    require_equal_periods(shared)
 
 
-def test_a_recording_whose_last_sample_would_move_keeps_its_period() -> None:
+def test_a_recording_whose_last_sample_would_move_is_interpolated() -> None:
     period, count = Fraction(1, 100), 1000
-    for slip, is_shared in ((MAX_SHARED_SLIP, True), (MAX_SHARED_SLIP * 2, False)):
-        other = period * (1 + slip / count)
-        (one,) = share_period([recording("a", other, count)], period)
-        assert (one.period == period) is is_shared
+    for slip, is_kept in ((MAX_SHARED_SLIP, True), (MAX_SHARED_SLIP * 2, False)):
+        one = recording("a", period * (1 + slip / count), count)
+        (shared,) = share_period([one], period)
+        assert shared.period == period
+        assert (shared.measured is one.measured) is is_kept
 
 
-def test_recordings_at_unlike_rates_do_not_share_a_period() -> None:
-    series = [recording("slow", Fraction(1, 100), 900), recording("fast", Fraction(1, 200), 1800)]
-    shared = share_period(series)
-    assert [one.period for one in shared] == [Fraction(1, 100), Fraction(1, 200)]
-    with pytest.raises(ValueError, match=r"slow \(100 Hz\), fast \(200 Hz\)"):
-        require_equal_periods(shared)
+def test_recordings_at_unlike_rates_get_the_longest_period_and_linear_signals() -> None:
+    fast = recording("fast", Fraction(1, 200), 1801)
+    ramp = np.arange(1801.0)[:, np.newaxis]
+    fast = dataclasses.replace(fast, inputs=ramp, measured=2.0 * ramp)
+    slow = recording("slow", Fraction(1, 77), 500)
+    found = share_period([fast, slow])
+    assert [one.period for one in found] == [Fraction(1, 77)] * 2
+    assert found[0].count == 1 + int(Fraction(1800, 200) * 77)
+    times = np.arange(found[0].count) / 77.0
+    np.testing.assert_allclose(found[0].inputs[:, 0], 200.0 * times, rtol=1e-12)
+    np.testing.assert_allclose(found[0].measured[:, 0], 400.0 * times, rtol=1e-12)
+
+
+def test_an_unknown_value_makes_its_neighbours_unknown_and_a_hit_sample_is_kept() -> None:
+    one = recording("a", Fraction(1, 100), 5)
+    one.measured[2] = np.nan
+    halves = interpolate(one, Fraction(1, 200))
+    assert np.flatnonzero(np.isnan(halves.measured[:, 0])).tolist() == [3, 4, 5]
+    same = interpolate(one, Fraction(1, 50))
+    assert np.flatnonzero(np.isnan(same.measured[:, 0])).tolist() == [1]
 
 
 def test_a_fast_model_keeps_the_samples_that_a_slow_one_does_not_need() -> None:

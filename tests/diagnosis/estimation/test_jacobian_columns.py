@@ -12,8 +12,12 @@ from diagnosis.estimation.levenberg_marquardt import estimate_parameters
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.estimation.normal_equations import NormalEquations, damped_step
 from diagnosis.model.parameter_vector import ParameterVector, vector_of
-from diagnosis.model.placed_effect import find_placements, shipped_effects
-from tests.diagnosis.estimation.test_levenberg_marquardt import TRUTH, bench, simulate_recordings
+from tests.diagnosis.estimation.test_levenberg_marquardt import (
+    TRUTH,
+    bench,
+    place_effect,
+    simulate_recordings,
+)
 
 __all__ = ["bench"]
 TONE = {"a_T_em": 6.0, "ord_T_em": 4.0, "ph_T_em": 0.5}
@@ -21,8 +25,7 @@ TONE = {"a_T_em": 6.0, "ord_T_em": 4.0, "ph_T_em": 0.5}
 
 @pytest.mark.parametrize("name", ["ord_T_em", "a_T_em", "J_em"])
 def test_a_column_is_the_slope_at_its_point(bench: ModelSet, name: str) -> None:
-    effect = next(one for one in shipped_effects() if one.name == "torque_ripple")
-    candidate = bench.compile_candidate((next(iter(find_placements(bench.document, effect))),))
+    candidate = bench.compile_candidate((place_effect(bench, "torque_ripple@T_em"),))
     series = simulate_recordings(candidate, {**TRUTH, **TONE})
     point = vector_of(candidate, len(series), {**TRUTH, **TONE})
     here = evaluate(candidate, series, measured_noise_levels(series, {}), point)
@@ -46,8 +49,7 @@ def test_a_column_is_the_slope_at_its_point(bench: ModelSet, name: str) -> None:
 
 
 def test_the_strength_of_a_tone_is_found_from_where_its_order_is_right(bench: ModelSet) -> None:
-    effect = next(one for one in shipped_effects() if one.name == "torque_ripple")
-    candidate = bench.compile_candidate((next(iter(find_placements(bench.document, effect))),))
+    candidate = bench.compile_candidate((place_effect(bench, "torque_ripple@T_em"),))
     series = simulate_recordings(candidate, {**TRUTH, **TONE})
     start = {**TRUTH, **TONE, "a_T_em": 1.0}
     found = estimate_parameters(candidate, series, measured_noise_levels(series, {}), start)

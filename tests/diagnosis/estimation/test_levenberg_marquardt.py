@@ -15,7 +15,7 @@ from diagnosis.estimation.levenberg_marquardt import estimate_parameters
 from diagnosis.estimation.model_set import ModelSet, balance_disturbances
 from diagnosis.estimation.noise_level import ORDINARY_LEVEL, disturbance_units
 from diagnosis.model.candidate import Candidate
-from diagnosis.model.placed_effect import find_placements, shipped_effects
+from diagnosis.model.placed_effect import PlacedEffect, find_placements, shipped_effects
 from diagnosis.selection.comparison import effective_gain
 from language.loading.load import automaton_of
 from language.overlays.expand_document import Project, expand_document, read_document
@@ -26,6 +26,21 @@ COUNT = 500
 TRUTH = {"J_em": 0.056, "k": 6600.0, "c": 54.0, "alpha": 0.022, "J_v": 120.0}
 FRICTION = {"T_c_w_em": 2.0}
 OUTPUTS = ("w_em", "w_s")
+
+
+SCALES = {
+    **{"load": Fraction(300), "rate": Fraction(100), "inertia": Fraction(100)},
+    **{"level": Fraction(100), "stretch": Fraction(1, 10), "time": Fraction(3, 10)},
+    **{"period": Fraction(1, 100), "horizon": Fraction(10)},
+}
+"""Magnitudes of the places of the driveline, rounded."""
+
+
+def place_effect(model_set: ModelSet, name: str) -> PlacedEffect:
+    """Return the effect `id@place` of the library with the magnitudes of the driveline."""
+    effect = next(one for one in shipped_effects() if one.name == name.partition("@")[0])
+    fits = find_placements(model_set.document, effect)
+    return dataclasses.replace(next(one for one in fits if one.id == name), scales=SCALES)
 
 
 def torque(kind: int) -> np.ndarray:
@@ -96,10 +111,7 @@ def test_a_clean_recording_gives_the_parameters_that_made_it(bench: ModelSet) ->
 
 def test_a_left_out_friction_gains_where_it_is_and_a_lag_does_not(bench: ModelSet) -> None:
     base = bench.compile_candidate(())
-    layers = {
-        layer.id: layer for e in bench.effects for layer in find_placements(bench.document, e)
-    }
-    friction = bench.compile_candidate((layers["coulomb_friction@w_em"],))
+    friction = bench.compile_candidate((place_effect(bench, "coulomb_friction@w_em"),))
     series = simulate_recordings(friction, {**TRUTH, **FRICTION})
     known = estimate_parameters(base, series, ordinary_noise_levels(base, series), {})
     start = {**known.values(0), "T_c_w_em": 0.5}
@@ -107,7 +119,7 @@ def test_a_left_out_friction_gains_where_it_is_and_a_lag_does_not(bench: ModelSe
     correlation = integrated_autocorrelation(better, series)
     assert effective_gain(better, known, correlation, len(series)) > 100.0
     assert better.values(0)["T_c_w_em"] == pytest.approx(2.0, rel=0.1)
-    lag = bench.compile_candidate((layers["sensor_lag@w_s"],))
+    lag = bench.compile_candidate((place_effect(bench, "sensor_lag@w_s"),))
     start = {**known.values(0), "tau_w_s": 0.002}
     worse = estimate_parameters(lag, series, known.noise_levels, start)
     assert known.cost - worse.cost < (known.cost - better.cost) / 4

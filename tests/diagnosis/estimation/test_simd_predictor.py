@@ -17,11 +17,11 @@ from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.model_set import ModelSet, balance_disturbances
 from diagnosis.model import compile_cache as recipe
 from diagnosis.model.candidate import Candidate
-from diagnosis.model.placed_effect import find_placements, shipped_effects
+from diagnosis.model.placed_effect import shipped_effects
 from language.loading.load import automaton_of, program_of
 from language.overlays.expand_document import Project, expand_document, read_document
 from tests.diagnosis.conftest import SOON
-from tests.diagnosis.estimation.test_levenberg_marquardt import OUTPUTS, PERIOD
+from tests.diagnosis.estimation.test_levenberg_marquardt import OUTPUTS, PERIOD, place_effect
 from tests.language.spec_builders import ROOT
 
 pytestmark = pytest.mark.long
@@ -67,10 +67,7 @@ def bench() -> ModelSet:
 
 
 def candidate_of(bench: ModelSet, name: str) -> Candidate:
-    layers = {
-        layer.id: layer for e in bench.effects for layer in find_placements(bench.document, e)
-    }
-    return bench.compile_candidate((layers[name],) if name else ())
+    return bench.compile_candidate((place_effect(bench, name),) if name else ())
 
 
 def recorded(predictor: Predictor, seed: int) -> StackedRecordings:

@@ -92,18 +92,18 @@ def test_places_are_those_where_an_effect_can_be_laid() -> None:
 
 
 def test_a_signature_is_what_the_equation_of_the_effect_says(tmp_path: Path) -> None:
-    """J dw/dt = T - b w from rest, and dry friction of 1 N*m: w is behind by (1 - e^-bt/J) / b."""
+    """J dw/dt = T - b w from rest, and dry friction T_c: w is behind by T_c (1 - e^-bt/J) / b."""
     project = project_of(tmp_path, bench_columns=MAP)
     base = expand_document(document(SPEC), project)
     (friction,) = (one for one in library_effects(SHIPPED) if one.name == "coulomb_friction")
     (layer,) = describe_effect(friction, base, project).placements
     found = simulate_signature(base, project, layer, ("T", "10 N*m"))
-    assert found.values == {"T_c": "1 N*m", "w_s": "0.1 rad/s"}
+    assert found.values == {"T_c": "0.1 N*m", "w_s": "0.01 rad/s"}
     times = found.without_effect.times
     change = found.with_effect.signals["spinner.w"] - found.without_effect.signals["spinner.w"]
     place = int(np.searchsorted(times, 0.95))
-    behind = (1.0 - np.exp(-0.1 * times[place] / 0.5)) / 0.1
-    assert change[place] == pytest.approx(-behind, abs=0.01)
+    behind = 0.1 * (1.0 - np.exp(-0.1 * times[place] / 0.5)) / 0.1
+    assert change[place] == pytest.approx(-behind, abs=0.001)
 
 
 @pytest.mark.parametrize(

@@ -92,10 +92,3 @@ def test_noise_is_measured_and_the_ordinary_disturbance_is_held(
     assert levels.process == {name: ORDINARY_LEVEL * unit for name, unit in units.items()}
     assert np.all(np.isfinite(levels.huber_limits))
     assert levels.huber_limits[0] > HUBER_STDS * NOISE
-
-
-def test_recordings_at_unlike_rates_are_not_fitted_together() -> None:
-    one = spin(is_linear=False)
-    fast = dataclasses.replace(one, name="fast", period=Fraction(1, 150))
-    with pytest.raises(ValueError, match="different rates"):
-        fit_base(rotor_of(one, fast))

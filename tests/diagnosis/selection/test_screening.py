@@ -14,12 +14,12 @@ from diagnosis.estimation.levenberg_marquardt import estimate_parameters
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.model.candidate import Candidate
 from diagnosis.model.parameter import FreeParameter
-from diagnosis.model.placed_effect import PlacedEffect, find_placements, shipped_effects
 from diagnosis.selection.screening import screen_candidate, start_values
 from tests.diagnosis.estimation.test_levenberg_marquardt import (
     FRICTION,
     TRUTH,
     bench,
+    place_effect,
     simulate_recordings,
 )
 from tests.diagnosis.localisation.test_ranking import fit_first_base
@@ -29,16 +29,10 @@ COUNT = 6
 """Recordings, one of which shows the drag of a brake."""
 
 
-def layer_of(bench: ModelSet, name: str) -> PlacedEffect:
-    """An effect of the library at a place."""
-    effect = next(one for one in shipped_effects() if one.name == name.partition("@")[0])
-    return next(one for one in find_placements(bench.document, effect) if one.id == name)
-
-
 @pytest.fixture(scope="module")
 def rubbing(bench: ModelSet) -> tuple[ModelSet, Estimate]:
     """Recordings of a driveline with dry friction of the motor, and the base fitted to them."""
-    friction = bench.compile_candidate((layer_of(bench, "coulomb_friction@w_em"),))
+    friction = bench.compile_candidate((place_effect(bench, "coulomb_friction@w_em"),))
     series = simulate_recordings(friction, {**TRUTH, **FRICTION})
     model_set = dataclasses.replace(bench, series=series)
     return model_set, fit_first_base(model_set)
@@ -46,7 +40,7 @@ def rubbing(bench: ModelSet) -> tuple[ModelSet, Estimate]:
 
 def test_a_few_steps_show_most_of_what_a_fit_gains(rubbing: tuple[ModelSet, Estimate]) -> None:
     model_set, base = rubbing
-    candidate = model_set.compile_candidate((layer_of(model_set, "coulomb_friction@w_em"),))
+    candidate = model_set.compile_candidate((place_effect(model_set, "coulomb_friction@w_em"),))
     screened = screen_candidate(model_set, base, candidate)
     fitted = estimate_parameters(
         candidate, model_set.series, base.noise_levels, {**base.values(0), **FRICTION}
@@ -61,15 +55,13 @@ def test_an_effect_that_does_not_act_gains_little(rubbing: tuple[ModelSet, Estim
     model_set, base = rubbing
     gains = []
     for name in ("coulomb_friction@w_em", "sensor_lag@w_em"):
-        candidate = model_set.compile_candidate((layer_of(model_set, name),))
+        candidate = model_set.compile_candidate((place_effect(model_set, name),))
         gains.append(base.cost - screen_candidate(model_set, base, candidate).cost)
     assert gains[1] < 0.25 * gains[0]
 
 
 def test_an_effect_that_a_single_recording_shows_is_found(bench: ModelSet) -> None:
-    drag = bench.compile_candidate(
-        (next(iter(find_placements(bench.document, layer_of(bench, "brake_drag@w_w").effect))),)
-    )
+    drag = bench.compile_candidate((place_effect(bench, "brake_drag@w_w"),))
     known = {**TRUTH, "T_r_w_w": 150.0}
     free, held = simulate_recordings(drag, known), simulate_recordings(drag, known, brake=300.0)
     series = tuple(
@@ -84,7 +76,7 @@ def test_a_candidate_that_diverges_has_an_infinite_cost(
     rubbing: tuple[ModelSet, Estimate],
 ) -> None:
     model_set, base = rubbing
-    candidate = model_set.compile_candidate((layer_of(model_set, "coulomb_friction@w_em"),))
+    candidate = model_set.compile_candidate((place_effect(model_set, "coulomb_friction@w_em"),))
     huge = tuple(dataclasses.replace(one, inputs=one.inputs + np.inf) for one in model_set.series)
     lost = dataclasses.replace(model_set, series=huge)
     assert screen_candidate(lost, base, candidate).cost == np.inf

@@ -1,5 +1,7 @@
-"""Reference magnitude: the size of the torque, force or signal at a place,
-for comparison with a disturbance.
+"""Place magnitude: the size of the force, signal, inertia and time at a place, from recordings.
+
+A disturbance is compared with what acts at its place, and parameters of effects start at multiples
+of such magnitudes.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from diagnosis.data.array_types import Reals
 from diagnosis.data.stacked_recordings import burn_in_samples
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.model_set import ModelSet
+from diagnosis.model.parameter import declared_value
 from diagnosis.model.placed_effect import disturbance_effect
 from language.overlays.effect_place import PlaceMismatch, find_effect_place
 
@@ -31,7 +34,7 @@ def acting_rms(model_set: ModelSet, section: str, place: str, model: Estimate) -
             np.nanstd(np.concatenate([one.measured[:, column] for one in model_set.series]))
         )
     holes = place_bindings(model_set, section, place)
-    factor = _coefficient_value(
+    factor = coefficient_value(
         model_set, model, holes.get("inertia" if section == "flow" else "stiffness", "")
     )
     name = place if section == "flow" else holes.get("twist", "")
@@ -43,11 +46,11 @@ def acting_rms(model_set: ModelSet, section: str, place: str, model: Estimate) -
     if section == "flow":
         period = float(model_set.period)
         moved = [np.diff(one[:, states.index(name)]) / period for one in rows]
-        return factor * _rms(np.concatenate(moved))
+        return factor * rms(np.concatenate(moved))
     gap = holes.get("gap", "")
     slack = [one[:, states.index(gap)] if gap in states else 0.0 for one in rows]
     twist = [one[:, states.index(name)] - free for one, free in zip(rows, slack, strict=True)]
-    return factor * _rms(np.concatenate(twist))
+    return factor * rms(np.concatenate(twist))
 
 
 def disturbance_unit(model_set: ModelSet, section: str, place: str) -> str:
@@ -77,15 +80,12 @@ def place_bindings(model_set: ModelSet, section: str, place: str) -> dict[str, s
     return {name: value for name, value in found.holes.items() if isinstance(value, str)}
 
 
-def _coefficient_value(model_set: ModelSet, model: Estimate, text: str) -> float | None:
-    """Return the fitted or declared value of a parameter; None if `text` is not one."""
-    known = model.values(0).get(text)
-    declared = model_set.automaton.parameters.get(text)
-    if known is not None or declared is None or declared.value is None:
-        return known
-    return float(declared.value)
+def coefficient_value(model_set: ModelSet, model: Estimate, text: str) -> float | None:
+    """Return the value of a coefficient [SI]: fitted if it is a parameter, else as declared."""
+    fitted = model.values(0).get(text)
+    return declared_value(model_set.automaton, text) if fitted is None else fitted
 
 
-def _rms(values: Reals) -> float:
+def rms(values: Reals) -> float:
     """Return the root mean square; 0 for no values."""
     return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
