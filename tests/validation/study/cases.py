@@ -29,7 +29,7 @@ class Cases:
     labels: Path
 
     @property
-    def seal(self) -> str:
+    def digest(self) -> str:
         """The SHA-256 of the labels."""
         return hashlib.sha256(self.labels.read_bytes()).hexdigest()
 

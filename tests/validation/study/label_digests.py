@@ -20,7 +20,7 @@ Digests = Mapping[str, str]
 def label_digests(every: Sequence[Generator]) -> dict[str, str]:
     """Return the digests of all groups of generators; the cases are written if they are missing."""
     return {
-        group.key: generate_cases(generator, group).seal
+        group.key: generate_cases(generator, group).digest
         for generator in every
         for group in generator.groups
     }

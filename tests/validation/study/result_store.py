@@ -96,7 +96,7 @@ def _manifest(group: Group, cases: Cases) -> Manifest:
     identity = {
         "code": _code(),
         "seed": str(group.seed),
-        "labels": cases.seal,
+        "labels": cases.digest,
         "group": repr(group),
         "kept": repr(MEASURES),
     }

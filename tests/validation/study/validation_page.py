@@ -94,10 +94,7 @@ def _effects(
 
 
 def _wrong(answers: Sequence[Answer]) -> list[dict[str, str]]:
-    """Return a row for each generator, group and effect with the wrong verdicts and their counts.
-
-    A probability in brackets is the largest one of a wrong name.
-    """
+    """Return a row for each generator, group and effect: the wrong verdicts with their counts."""
     found: dict[tuple[str, str, str], list[Answer]] = {}
     for one in answers:
         if _is_wrong(one):
