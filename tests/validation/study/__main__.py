@@ -22,7 +22,7 @@ from tests.validation.study.label_digests import (
     stored_digests,
 )
 from tests.validation.study.result_store import diagnose_group, export_groups
-from tests.validation.study.stored_answers import RESULTS, read_answers
+from tests.validation.study.stored_answers import RESULTS, is_current, read_answers
 from tests.validation.study.validation_page import PAGE, write_page
 
 EXAMPLES = """\
@@ -41,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = _parser().parse_args(arguments)
     every = generators(given.seed)
     if given.page:
-        write_page(read_answers(), every, stored_digests())
+        write_page(read_answers(), every, stored_digests(), is_current=is_current())
         return 0
     selected = _select(every, given.generators, given.groups)
     is_study = given.seed is None and given.share == 1.0

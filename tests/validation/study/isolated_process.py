@@ -79,9 +79,11 @@ def diagnose_case(
 
 
 def _copy_library(folder: Path, without: tuple[str, ...]) -> Path:
-    """Copy the effect library without some effects to a folder; return the folder."""
+    """Copy the effect library without some effects to a folder; return the folder.
+
+    Raises FileNotFoundError for an effect that the library does not have.
+    """
     shutil.copytree(Path(str(files("spec"))) / "effects", folder)
-    for name in without:
-        for file in FILES.get(name, (name,)):
-            (folder / f"{file}.yaml").unlink(missing_ok=True)
+    for file in {file for name in without for file in FILES.get(name, (name,))}:
+        (folder / f"{file}.yaml").unlink()
     return folder

@@ -66,7 +66,7 @@ def export_groups(every: Iterable[Generator], path: Path) -> int:
         for generator in every
         for group in generator.groups
     }
-    return export_results(stores, path, _code())
+    return export_results(stores, path, product_digest())
 
 
 def answer_of(row: Mapping[str, Any]) -> Answer:
@@ -80,10 +80,11 @@ def answer_of(row: Mapping[str, Any]) -> Answer:
 
 
 def _folder(group: Group, cases: Cases) -> Path:
-    return FOLDER / "results" / _code()[:16] / cases.folder.name / group.name
+    return FOLDER / "results" / product_digest()[:16] / cases.folder.name / group.name
 
 
-def _code() -> str:
+def product_digest() -> str:
+    """Return the digest of all code and specs that a diagnosis depends on."""
     return code_digest((*CODE, "diagnosis"))
 
 
@@ -94,7 +95,7 @@ def _open(group: Group, cases: Cases) -> Store:
 def _manifest(group: Group, cases: Cases) -> Manifest:
     """Return what the results depend on: code, labels, group and stored columns."""
     identity = {
-        "code": _code(),
+        "code": product_digest(),
         "seed": str(group.seed),
         "labels": cases.digest,
         "group": repr(group),

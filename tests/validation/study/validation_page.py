@@ -18,6 +18,7 @@ from tests.validation.study.figures import FIGURES, measure
 from tests.validation.study.generator_table import Generator
 from tests.validation.study.proportion import rate_of
 from tests.validation.study.real_machines import stored_results
+from tests.validation.study.result_store import product_digest
 from tests.validation.study.simpler_methods import compare_methods
 
 PAGE = ROOT / "docs" / "validation.md"
@@ -35,17 +36,22 @@ def write_page(
     every: Sequence[Generator],
     digests: Mapping[str, str],
     path: Path = PAGE,
+    is_current: bool = True,
 ) -> None:
-    """Write the page to a file."""
-    path.write_text(render_page(answers, every, digests), encoding="utf-8")
+    """Write the page to a file; `is_current` tells whether the answers are of the present code."""
+    path.write_text(render_page(answers, every, digests, is_current), encoding="utf-8")
 
 
 def render_page(
-    answers: Sequence[Answer], every: Sequence[Generator], digests: Mapping[str, str]
+    answers: Sequence[Answer],
+    every: Sequence[Generator],
+    digests: Mapping[str, str],
+    is_current: bool = True,
 ) -> str:
     """Return the page; `digests` are those of the labels, by `generator/group`."""
     template = Path(__file__).with_name("validation.md.jinja").read_text("utf-8")
     shown = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    machines = stored_results()
     return shown.from_string(template).render(
         generators=every,
         names=[one.name for one in every],
@@ -57,7 +63,9 @@ def render_page(
         wrong=_wrong(answers),
         methods=compare_methods(answers),
         accepted=_accepted(),
-        machines=stored_results(),
+        machines=machines,
+        is_current=is_current,
+        are_machines_current=all(one["code"] == product_digest() for one in machines),
         constants=decision_constants(),
     )
 
