@@ -18,7 +18,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # A shell fragment that puts a Python that is new enough into $$python.
 find_python := python=$$(tools/find_python.sh $(PYTHON)) || exit
 
-.PHONY: help setup system-packages demo test long-test recordings-test target-test prove verify verify-part prove-diagnosis paper bench check
+.PHONY: help setup system-packages demo test long-test recordings-test target-test prove verify verify-part validate-diagnosis paper bench check
 .PHONY: format generate lock clean
 .PHONY: check-lock check-format check-lint check-types check-floors check-specs check-tests check-generated
 
@@ -73,10 +73,10 @@ verify: setup ## measure every figure of docs/evidence; with recordings: ARGS="-
 
 verify-part: setup ## measure a fixed part of the figures, as CI does
 	$(BIN)/python tests/validation/evidence/run_all.py --part
-	$(BIN)/python -m tests.validation.blind_study.regression_cases
+	$(BIN)/python -m tests.validation.study.regression_cases
 
-prove-diagnosis: setup ## diagnose the sealed cases blind, write docs/proof.md (hours; resumable)
-	$(BIN)/python -m tests.validation.blind_study $(ARGS)
+validate-diagnosis: setup ## diagnose cases of several generators, write docs/validation.md (hours; resumable)
+	$(BIN)/python -m tests.validation.study $(ARGS)
 
 paper: setup ## reproduce the reference paper from specs: docs/paper, build/paper.json (minutes; resumable)
 	$(BIN)/python -m tests.validation.paper $(ARGS)

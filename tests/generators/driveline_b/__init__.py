@@ -1,0 +1,1 @@
+"""Recordings of an electric driveline that lacks or has one of seventeen effects."""
