@@ -13,8 +13,8 @@ from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.estimate import Estimate
 
-MAX_LAG = 0.25
-"""Longest lag [s]."""
+MAX_LAG = 1.0
+"""Longest lag, in middle times of the recordings."""
 
 
 def integrated_autocorrelation(model: Estimate, series: Sequence[SampledRecording]) -> float:
@@ -23,14 +23,14 @@ def integrated_autocorrelation(model: Estimate, series: Sequence[SampledRecordin
 
     Squared autocorrelations apply to quadratic functions such as log-likelihoods (Bartlett 1946).
     """
-    return _integrated_autocorrelation(model.prediction.innovations, float(series[0].period))
+    lags = round(float(np.median([one.sample_count(MAX_LAG) for one in series])))
+    return _integrated_autocorrelation(model.prediction.innovations, lags)
 
 
-def _integrated_autocorrelation(innovations: Sequence[Reals], period: float) -> float:
+def _integrated_autocorrelation(innovations: Sequence[Reals], lags: int) -> float:
     """Return the integrated autocorrelation over some recordings;
     unknown innovations are dropped.
     """
-    lags = max(1, round(MAX_LAG / period))
     by_output = []
     for channel in range(innovations[0].shape[1]):
         by_recording = [e[np.isfinite(e[:, channel]), channel] for e in innovations]

@@ -9,6 +9,7 @@ An input is held (zero-order hold), or linear between its time stamps if the rec
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -32,6 +33,8 @@ MAX_SHARED_SLIP = Fraction(1, 4)
 """Slip at the end of a recording, in periods, with which it shares the grid of another one."""
 DECIMATED_PERIOD = Fraction(5, 1000)
 """Longest period [s] to which faster recordings are decimated."""
+DECIMATED_COUNT = 1500
+"""Samples that a recording of median length keeps when it is decimated."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,17 @@ class SampledRecording:
     def count(self) -> int:
         """The number of samples."""
         return len(self.inputs)
+
+    @property
+    def middle_time(self) -> float:
+        """The geometric mean [s] of the period and the length: the middle of the times that the
+        recording can show.
+        """
+        return float(self.period) * math.sqrt(max(self.count, 1))
+
+    def sample_count(self, multiple: float) -> int:
+        """Return the number of samples, at least 1, in a multiple of `middle_time`."""
+        return max(1, round(multiple * self.middle_time / float(self.period)))
 
     @cached_property
     def first_measured(self) -> Reals:
@@ -174,9 +188,12 @@ def resample(
     automaton: Automaton,
     output_names: Sequence[str],
     is_first_order_hold: bool,
+    period: Fraction | None = None,
 ) -> tuple[SampledRecording, ...]:
     """Return recordings with the given hold, decimated if no compared output has feed-through.
 
+    The period [s] is the given one, or the longest one that follows the dynamics of the model
+    (`time_resolution`), is at most `DECIMATED_PERIOD` and leaves `DECIMATED_COUNT` samples.
     With direct feed-through (`has_feedthrough`) the recordings keep their samples and only the hold
     is set, because an output that follows the mean of an input was never measured. Raises
     ValueError as `decimate`.
@@ -185,8 +202,10 @@ def resample(
         return tuple(
             dataclasses.replace(one, is_first_order_hold=is_first_order_hold) for one in series
         )
-    longest = time_resolution(automaton, DECIMATED_PERIOD)
-    return tuple(decimate(one, is_first_order_hold, longest) for one in series)
+    if period is None:
+        length = sorted(one.count * one.period for one in series)[len(series) // 2]
+        period = time_resolution(automaton, min(DECIMATED_PERIOD, length / DECIMATED_COUNT))
+    return tuple(decimate(one, is_first_order_hold, period) for one in series)
 
 
 def share_period(

@@ -12,8 +12,8 @@ from codegen.predictor.predictor_arrays import StackedRecordings
 from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 
-BURN_IN = 0.5
-"""Seconds at the start of a recording that are not scored, while the observer finds the states."""
+BURN_IN = 2.0
+"""Middle times at the start of a recording that are not scored: the observer finds the states."""
 CACHE_SIZE = 24
 """Number of stacked sets that are cached; the least recently used one is dropped."""
 
@@ -34,11 +34,11 @@ _cache: OrderedDict[tuple[int, ...], StackedExperiments] = OrderedDict()
 
 
 def burn_in_samples(series: SampledRecording) -> int:
-    """Return the samples in the burn-in of a recording: `BURN_IN` (0.5 s), rounded, at least 1.
+    """Return the samples in the burn-in of a recording: `BURN_IN` (2) middle times, at least 1.
 
-    It may exceed the number of samples of the recording.
+    It may exceed the number of samples of a recording of less than four.
     """
-    return max(1, round(BURN_IN / float(series.period)))
+    return series.sample_count(BURN_IN)
 
 
 def stack_recordings(series: Sequence[SampledRecording]) -> StackedExperiments:

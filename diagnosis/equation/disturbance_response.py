@@ -22,7 +22,7 @@ from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.estimation.place_magnitude import DISTURBANCE_KIND_BY_SECTION
 from diagnosis.model.candidate import Candidate, compile_candidate
-from diagnosis.model.placed_effect import DISTURBANCE_STATE, PlacedEffect, disturbance_effect
+from diagnosis.model.placed_effect import DISTURBANCE_STATE, disturbance_effect
 from language.expressions.syntax_tree import Name
 from language.model.automaton import Automaton
 from language.readers.element_reader import outputs_as_mapping
@@ -116,8 +116,8 @@ def build_disturbance_response(
     cannot be placed, KeyError for a section other than flow, elements and outputs.
     """
     kind = DISTURBANCE_KIND_BY_SECTION[section]
-    disturbance = disturbance_effect(kind, place)
-    placed_effect = PlacedEffect(disturbance.effect, place, f"probe_{place}"[:25])
+    disturbance = model_set.scale_disturbance(disturbance_effect(kind, place))
+    placed_effect = dataclasses.replace(disturbance, suffix=f"probe_{place}"[:25])
     torques = element_torques(model_set.automaton)
     seen = (*model_set.output_names, *torques, placed_effect.qualified_name(DISTURBANCE_STATE))
     document = _with_outputs(model_set.document, seen)

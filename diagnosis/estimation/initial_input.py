@@ -17,8 +17,8 @@ from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.estimate import Estimate, predict_with_gains_of
 from diagnosis.model.parameter_vector import ParameterVector
 
-AVERAGING_TIME = 0.1
-"""Time [s] at the start over which inputs are averaged."""
+AVERAGING_TIME = 0.5
+"""Middle times at the start over which inputs are averaged."""
 HYPOTHESIS_STDS = 4.0
 """Distance of an alternative first input, in standard deviations of its noise."""
 MIN_GAIN = 3.0
@@ -26,11 +26,11 @@ MIN_GAIN = 3.0
 
 
 def average_initial_inputs(series: SampledRecording) -> SampledRecording:
-    """Return a recording whose first sample of each input is the mean over the first 0.1 s.
+    """Return a recording whose first sample of each input is a mean over the first samples.
 
     The window is `AVERAGING_TIME`, rounded to samples, at least 1; other samples do not change.
     """
-    count = max(1, round(AVERAGING_TIME / float(series.period)))
+    count = series.sample_count(AVERAGING_TIME)
     inputs = series.inputs.copy()
     inputs[0] = np.mean(inputs[:count], axis=0)
     return dataclasses.replace(series, inputs=inputs)

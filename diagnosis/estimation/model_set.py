@@ -9,6 +9,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from fractions import Fraction
 
+import numpy as np
+
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.checkpoint import NO_CACHE, FitCache
 from diagnosis.estimation.estimate import Estimate
@@ -79,9 +81,8 @@ class ModelSet:
         SpecError if they cannot be combined.
         """
         disturbances = self.disturbances if disturbances is None else disturbances
-        key = (
-            *(placed_effect.id for placed_effect in placed_effects),
-            *(placed_effect.id for placed_effect in disturbances),
+        key = tuple(
+            f"{one.id} {sorted(one.scales.items())}" for one in (*placed_effects, *disturbances)
         )
         if key not in self._compiled:
             self._compiled[key] = compile_candidate(
@@ -107,6 +108,13 @@ class ModelSet:
                 if self._is_applicable(placed_effect):
                     scales = self.scales.get(place_path(placed_effect), {})
                     yield dataclasses.replace(placed_effect, scales=scales)
+
+    def scale_disturbance(self, disturbance: PlacedEffect) -> PlacedEffect:
+        """Return a disturbance with the median middle time of the recordings as magnitude of its
+        place, rounded to one digit.
+        """
+        middle = float(np.median([one.middle_time for one in self.series]))
+        return dataclasses.replace(disturbance, scales={"time": Fraction(f"{middle:.0e}")})
 
     def try_compile(self, placed_effects: Sequence[PlacedEffect]) -> Candidate | None:
         """Return the base with effects, or None if they cannot be combined (SpecError).

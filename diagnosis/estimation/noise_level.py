@@ -1,6 +1,7 @@
 """Noise levels: the unit of a disturbance, and the level of the ordinary disturbance.
 
-A disturbance of one unit changes a compared output by its own noise within `UNIT_RESPONSE_TIME`.
+A disturbance of one unit changes a compared output by its own noise within the middle time of the
+recordings (`SampledRecording.middle_time`), about 0.2 s for recordings of 10 s.
 The level is held while effects are compared, because a fitted one absorbs the physics that is
 sought (docs/method.md).
 """
@@ -16,8 +17,6 @@ from diagnosis.estimation.innovations import measured_noise_levels
 from diagnosis.estimation.operating_point import linearise_near, operating_points
 from diagnosis.model.candidate import Candidate
 
-UNIT_RESPONSE_TIME = 0.2
-"""Time [s] in which a disturbance of one unit changes an output by its noise."""
 ORDINARY_LEVEL = 0.1
 """Level of the ordinary disturbance of each balance, in units, held in every model."""
 HUBER_STDS = 4.0
@@ -29,8 +28,8 @@ def disturbance_units(
 ) -> dict[str, float]:
     """Return the unit [SI] of each disturbance state, by name.
 
-    One unit changes some output by its measured noise after `UNIT_RESPONSE_TIME` (0.2 s), by the
-    model linearised at the start of the first recording (at most 1e12 for a disturbance without
+    One unit changes some output by its measured noise after the median middle time, by the model
+    linearised at the start of the first recording (at most 1e12 for a disturbance without
     response). `start` are values [SI] of parameters. Raises ValueError if the model cannot be
     linearised there.
     """
@@ -40,7 +39,7 @@ def disturbance_units(
     linear = linearise_near(candidate, page, mode, operating_point.states, operating_point.inputs)
     if linear is None:
         raise ValueError("the base is unstable where the first recording starts")
-    count = max(1, round(UNIT_RESPONSE_TIME / float(series[0].period)))
+    count = round(float(np.median([one.sample_count(1.0) for one in series])))
     ahead = linear.c @ np.linalg.matrix_power(linear.phi, count)
     units = {}
     for name in candidate.disturbance_states:

@@ -21,11 +21,8 @@ from diagnosis.model.placed_effect import DISTURBANCE_STATE, PlacedEffect
 
 SIGNIFICANT_STDS = 3.0
 """Standard deviations beyond which a disturbance is significant."""
-OSCILLATION_PERIOD = 0.2
-"""Period [s] of a driveline oscillation.
-
-Windows nearer than this are merged, and windows shorter than half of it are dropped.
-"""
+WINDOW_DISTANCE = 1.0
+"""Middle times of a recording: nearer windows are merged, windows of less than half are dropped."""
 MAX_WINDOWS = 12
 
 
@@ -128,7 +125,7 @@ def with_disturbances(
     """Return a location with a disturbance over time, and the values that follow from it.
 
     These are rms, fraction, windows, modes and correlates. The windows are the longest ones first,
-    at most `MAX_WINDOWS` (12): samples beyond `SIGNIFICANT_STDS` nearer than `OSCILLATION_PERIOD`
+    at most `MAX_WINDOWS` (12): samples beyond `SIGNIFICANT_STDS` nearer than `WINDOW_DISTANCE`
     (0.2 s) are merged, and windows shorter than half of it are dropped. The location must have a
     free model.
     """
@@ -182,15 +179,16 @@ def _significant_windows(
     """Return the windows (start [s], end [s], recording) in which a disturbance is significant."""
     period = float(series.period)
     start = float(series.start) + burn_in_samples(series) * period
+    distance = series.sample_count(WINDOW_DISTANCE)
     there = np.flatnonzero(disturbance.is_significant)
     if not len(there):
         return []
-    parts = np.split(there, np.flatnonzero(np.diff(there) * period > OSCILLATION_PERIOD) + 1)
+    parts = np.split(there, np.flatnonzero(np.diff(there) > distance) + 1)
     ends = [(float(part[0]), float(part[-1])) for part in parts]
     return [
         (start + low * period, start + high * period, series.name)
         for low, high in ends
-        if (high - low) * period >= 0.5 * OSCILLATION_PERIOD
+        if 2.0 * (high - low) >= distance
     ]
 
 

@@ -62,6 +62,7 @@ def disturbance_locations(model_set: ModelSet, base: Estimate) -> list[tuple[str
     locations += [
         ("outputs", disturbance_effect("output", name)) for name in model_set.output_names
     ]
+    locations = [(section, model_set.scale_disturbance(one)) for section, one in locations]
     effects = base.candidate.placed_effects
     return [
         (section, one)

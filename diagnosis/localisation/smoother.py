@@ -18,8 +18,8 @@ from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.kalman_gain import LocalModel, local_models
 
-AVERAGING_TIME = 1.0
-"""Time [s] over which normalised squared innovations are averaged."""
+AVERAGING_TIME = 4.0
+"""Middle times over which normalised squared innovations are averaged."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,8 @@ def smooth_states(estimate: Estimate, series: Sequence[SampledRecording]) -> lis
     """Return the smoothed states of each recording to which a model was fitted.
 
     The standard deviations are multiplied by the root of the mean normalised square of innovations
-    over `AVERAGING_TIME` (1 s), where that exceeds 1. Samples after a run diverged are left out.
+    over `AVERAGING_TIME` (4 middle times), where that exceeds 1. Samples after a run diverged are
+    left out.
     Raises ValueError if the model is unstable in every mode.
     """
     candidate, noise_levels = estimate.candidate, estimate.noise_levels
@@ -78,7 +79,7 @@ def smooth_states(estimate: Estimate, series: Sequence[SampledRecording]) -> lis
     after, spread, ratios = smooth_deviations(steps, start, noise_levels.outputs**2)
     result = []
     for r, run in enumerate(estimate.prediction.predictions):
-        around = max(1, round(AVERAGING_TIME / float(series[r].period)))
+        around = max(1, series[r].sample_count(AVERAGING_TIME))
         scale = np.sqrt(np.maximum(_moving_mean(ratios[: run.completed, :, r], around), 1.0))
         states = (
             run.states[: run.completed]

@@ -180,8 +180,8 @@ def lower_tunable_program(
     """Return the Program in which `names` are tunable, and the major steps in a period [s].
 
     The step divides the period into at least `min_substeps` and at most `MAX_STEPS` (40) parts and
-    is at most `MAX_STEP` (5 ms). It is at most the `time_resolution` at the declared parameters and
-    with those of `effect_parameters` at a quarter and four times their values (within their
+    is at most `MAX_STEP` (5 ms) or the period. It is at most the `time_resolution` at the declared
+    parameters and with those of `effect_parameters` at a quarter and four times their values (within their
     ranges), and not longer than any nonzero time among these: the eigenvalue of a limited rate is
     not known beforehand.
     """
@@ -190,8 +190,9 @@ def lower_tunable_program(
         for factor in (PARAMETER_FACTOR, 1 / PARAMETER_FACTOR)
     ]
     variants = [one for one in scaled if one.parameters != automaton.parameters]
-    accurate = [time_resolution(one, MAX_STEP) for one in (automaton, *variants)]
-    longest = min(*accurate, *_time_values(automaton, effect_parameters), MAX_STEP)
+    slowest = max(MAX_STEP, period)
+    accurate = [time_resolution(one, slowest) for one in (automaton, *variants)]
+    longest = min(*accurate, *_time_values(automaton, effect_parameters), slowest)
     substeps = min(max(min_substeps, -(-period // longest)), MAX_STEPS)
     parameters = {
         name: dataclasses.replace(parameter, kind="tunable") if name in names else parameter

@@ -112,9 +112,7 @@ def diagnose(case: Case, log: LogCallback = lambda text: None) -> Diagnosis:
     verdict = dataclasses.replace(
         verdict, inputs=hashes, messages=(format_location(locations, model_set),)
     )
-    held_out, unread = _read_held_out(
-        case, automaton, seen, model_set.series[0].is_first_order_hold, series[0].period
-    )
+    held_out, unread = _read_held_out(case, automaton, seen, series[0].period, model_set)
     for text in unread:
         log(text)
     if held_out:
@@ -136,11 +134,13 @@ def _read_held_out(
     case: Case,
     automaton: Automaton,
     output_names: Sequence[str],
-    is_first_order_hold: bool,
     period: Fraction,
+    model_set: ModelSet,
 ) -> tuple[tuple[SampledRecording, ...], tuple[str, ...]]:
     """Return the held-out recordings, and a message for each file that cannot be used.
 
+    They are brought to the period [s] of the training recordings, then decimated to that of the
+    model set.
     Unreadable files and copies of other recordings are left out; the verdict stands without them.
     """
     recordings: list[SampledRecording] = []
@@ -153,7 +153,8 @@ def _read_held_out(
             continue
         try:
             shared = share_period(read_series(path, case, automaton, output_names), period)
-            recordings += resample(shared, automaton, output_names, is_first_order_hold)
+            is_linear = model_set.series[0].is_first_order_hold
+            recordings += resample(shared, automaton, output_names, is_linear, model_set.period)
         except (SpecError, ValueError) as error:
             why = error.problems[0].label if isinstance(error, SpecError) else str(error)
             unread.append(f"{case.name_of(path)} was held out and cannot be used: {why}")

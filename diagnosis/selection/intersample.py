@@ -52,6 +52,8 @@ def _fit_with_hold(model_set: ModelSet, is_linear: bool) -> FittedBase:
     series = resample(model_set.series, model_set.automaton, model_set.output_names, is_linear)
     averaged = tuple(average_initial_inputs(one) for one in series)
     paced = dataclasses.replace(model_set, series=averaged)
+    disturbances = tuple(paced.scale_disturbance(one) for one in model_set.disturbances)
+    paced = dataclasses.replace(paced, disturbances=disturbances)
     candidate = paced.compile_candidate(())
     fit = partial(_first_fit, candidate, averaged)
     first = paced.load_or_fit("first fit", candidate, [], fit)

@@ -26,10 +26,10 @@ from diagnosis.localisation.disturbance_state_fit import (
 from diagnosis.model.parameter_vector import ParameterVector
 
 Booleans = NDArray[np.bool_]
-MARGIN = 0.5
-"""Time [s] before and after an active interval that does not count as inactive."""
-MIN_DURATION = 2.0
-"""Shortest inactive interval [s]; the observer must find the states in it."""
+MARGIN = 2.0
+"""Middle times before and after an active interval that do not count as inactive."""
+MIN_DURATION = 8.0
+"""Shortest inactive interval, in middle times; the observer must find the states in it."""
 MIN_INACTIVE_FRACTION = 1.0 / 3.0
 """Smallest fraction of the samples that is inactive, for parameters to follow from it."""
 
@@ -66,7 +66,7 @@ def _inactive_recordings(
     """
     found = []
     for r, (one, there) in enumerate(zip(series, active, strict=True)):
-        around = np.ones(2 * round(MARGIN / float(one.period)) + 1)
+        around = np.ones(2 * one.sample_count(MARGIN) + 1)
         near = (
             np.convolve(np.pad(there, (burn_in_samples(one), 0)).astype(float), around, "same")
             > 0.5
@@ -83,11 +83,7 @@ def _inactive_parts(series: SampledRecording, active: Booleans) -> list[SampledR
     found = []
     for low, high in pairwise(edges):
         first = known[np.searchsorted(known, low) :][:1]
-        if (
-            not active[low]
-            and len(first)
-            and (high - first[0]) * float(series.period) >= MIN_DURATION
-        ):
+        if not active[low] and len(first) and high - first[0] >= series.sample_count(MIN_DURATION):
             part = slice(int(first[0]), high)
             found.append(
                 dataclasses.replace(

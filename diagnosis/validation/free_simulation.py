@@ -20,10 +20,11 @@ from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.innovations import predict
 from diagnosis.validation.misfit import Misfit
 
-OBSERVED_TIME = 1.0
-"""Time [s] with corrections by the observer."""
-FREE_TIME = 1.5
-"""Time [s] of free simulation."""
+OBSERVED_TIME = 4.0
+"""Middle times of a recording with corrections by the observer."""
+FREE_TIME = 6.0
+"""Middle times of free simulation."""
+WINDOW_TIME = OBSERVED_TIME + FREE_TIME
 
 
 def compare_misfits(
@@ -83,8 +84,8 @@ def output_stds(series: Sequence[SampledRecording]) -> Reals:
 def simulate_free(model: Estimate, series: Sequence[SampledRecording]) -> list[Reals]:
     """Return the outputs of a model, observed and free in turn, (samples, outputs) each.
 
-    An observer corrects the model for `OBSERVED_TIME` (1 s), then it runs freely for `FREE_TIME`
-    (1.5 s). The samples after a run diverged are NaN.
+    An observer corrects the model for `OBSERVED_TIME` (4 middle times), then it runs freely for
+    `FREE_TIME` (6 middle times). The samples after a run diverged are NaN.
     """
     masked = [
         dataclasses.replace(one, measured=np.where(is_free(one)[:, None], np.nan, one.measured))
@@ -108,8 +109,8 @@ def is_after_burn_in(series: SampledRecording) -> NDArray[np.bool_]:
 def is_free(series: SampledRecording) -> NDArray[np.bool_]:
     """Return the mask (samples,) of samples in free simulation.
 
-    These are the last `FREE_TIME` (1.5 s) of each period of `OBSERVED_TIME` + `FREE_TIME` (2.5 s)
-    from the first sample on.
+    These are the last `FREE_TIME` of each period of `OBSERVED_TIME` + `FREE_TIME` from the first
+    sample on.
     """
-    time = np.arange(series.count) * float(series.period)
-    return np.asarray(np.mod(time, OBSERVED_TIME + FREE_TIME) >= OBSERVED_TIME)
+    observed, whole = series.sample_count(OBSERVED_TIME), series.sample_count(WINDOW_TIME)
+    return np.asarray(np.mod(np.arange(series.count), whole) >= observed)

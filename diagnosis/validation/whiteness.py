@@ -15,9 +15,8 @@ from scipy.stats import chi2
 from diagnosis.data.array_types import Reals
 from diagnosis.estimation.estimate import Estimate
 
-MAX_LAG_TIME = 0.25
-"""Longest lag [s]."""
-MAX_LAGS = 60
+MAX_LAGS = 50
+"""Longest lag [samples]."""
 BAND_STDS = 2.576
 """Standard deviations of the 99 % band."""
 NEGLIGIBLE_FRACTION = 0.05
@@ -85,11 +84,11 @@ def ljung_box(name: str, parts: Sequence[Reals], period: float) -> WhitenessTest
 
     The statistic is the sum over lags of the number of pairs times the squared autocorrelation; it
     has a chi-squared distribution with as many degrees of freedom as lags. The lags reach to
-    `MAX_LAG_TIME` (0.25 s), `MAX_LAGS` (60) samples or a quarter of the shortest part, whichever is
-    least, but there is one at least. The mean is not subtracted.
+    `MAX_LAGS` (50) samples or a quarter of the shortest part, whichever is less, but there is one
+    at least. The mean is not subtracted.
     """
     shortest = min(len(part) for part in parts)
-    count = max(1, min(MAX_LAGS, round(MAX_LAG_TIME / period), shortest // 4))
+    count = max(1, min(MAX_LAGS, shortest // 4))
     total = sum(int(np.sum(np.isfinite(part))) for part in parts)
     power = sum(float(np.nansum(part**2)) for part in parts) / max(total, 1)
     lags = np.arange(1.0, count + 1.0)

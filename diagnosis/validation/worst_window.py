@@ -10,7 +10,7 @@ import numpy as np
 from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.estimate import Estimate
-from diagnosis.validation.free_simulation import FREE_TIME, OBSERVED_TIME, is_free, simulate_free
+from diagnosis.validation.free_simulation import OBSERVED_TIME, WINDOW_TIME, is_free, simulate_free
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def rms_by_recording(runs: FreeRuns) -> list[tuple[str, Reals, Reals]]:
 def find_worst_window(runs: FreeRuns, units: Sequence[str], label: str) -> WorstWindow:
     """Return the window with the largest sum of normalised squared errors of the base.
 
-    Windows are `OBSERVED_TIME` + `FREE_TIME` (2.5 s) long and adjacent, the last one of a recording
+    Windows are `WINDOW_TIME` (10 middle times) long and adjacent, the last one of a recording
     may be shorter; only errors after `OBSERVED_TIME` count, over the standard deviation of the
     signal in all recordings. The first of equal windows is taken. `label` names the set of
     recordings in the title, `units` are those of the signals.
@@ -83,7 +83,7 @@ def find_worst_window(runs: FreeRuns, units: Sequence[str], label: str) -> Worst
     for k, one in enumerate(series):
         for start in _window_starts(one):
             window = _window_slice(one, start)
-            alone = slice(start + _sample_count(one, OBSERVED_TIME), window.stop)
+            alone = slice(start + one.sample_count(OBSERVED_TIME), window.stop)
             missed = (one.measured[alone] - before[k][alone]) / scale
             squares = float(np.nansum(missed**2))
             if squares > most:
@@ -95,7 +95,7 @@ def find_worst_window(runs: FreeRuns, units: Sequence[str], label: str) -> Worst
     return WorstWindow(
         one.name,
         f"worst window of the {label} recordings: {one.name}, {times[0]:.4g} to {times[-1]:.4g} s",
-        float(one.start) + (start + _sample_count(one, OBSERVED_TIME)) * period,
+        float(one.start) + (start + one.sample_count(OBSERVED_TIME)) * period,
         times,
         one.inputs[window],
         one.measured[window],
@@ -106,17 +106,12 @@ def find_worst_window(runs: FreeRuns, units: Sequence[str], label: str) -> Worst
     )
 
 
-def _sample_count(series: SampledRecording, seconds: float) -> int:
-    """Return the number of samples in a time [s]."""
-    return round(seconds / float(series.period))
-
-
 def _window_starts(series: SampledRecording) -> range:
     """Return the first samples of the windows that contain free simulation."""
-    last = max(1, series.count - _sample_count(series, OBSERVED_TIME) - 1)
-    return range(0, last, max(1, _sample_count(series, OBSERVED_TIME + FREE_TIME)))
+    last = max(1, series.count - series.sample_count(OBSERVED_TIME) - 1)
+    return range(0, last, series.sample_count(WINDOW_TIME))
 
 
 def _window_slice(series: SampledRecording, start: int) -> slice:
     """Return the samples of the window at a start."""
-    return slice(start, min(series.count, start + _sample_count(series, OBSERVED_TIME + FREE_TIME)))
+    return slice(start, min(series.count, start + series.sample_count(WINDOW_TIME)))

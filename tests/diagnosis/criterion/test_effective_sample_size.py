@@ -14,7 +14,7 @@ from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
 from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 
-BLANK = SampledRecording("a", Fraction(1, 100), Fraction(0), np.zeros((2, 1)), np.zeros((2, 1)))
+BLANK = SampledRecording("a", Fraction(1, 100), Fraction(0), np.zeros((625, 1)), np.zeros((625, 1)))
 
 
 def autocorrelation_of(*innovations: Reals) -> float:

@@ -8,9 +8,8 @@ from diagnosis.estimation.levenberg_marquardt import estimate_parameters
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.experiment.discrimination import MIN_LOG_BAYES_FACTOR, plan_experiment
 from diagnosis.experiment.manoeuvre import manoeuvres_for
-from diagnosis.model.placed_effect import find_placements
 from diagnosis.report.figures import draw_experiment
-from tests.diagnosis.estimation.test_levenberg_marquardt import FRICTION, bench
+from tests.diagnosis.estimation.test_levenberg_marquardt import FRICTION, bench, place_effect
 from tests.diagnosis.localisation.test_ranking import fit_first_base, with_effect
 
 __all__ = ["bench"]
@@ -31,8 +30,7 @@ def test_manoeuvres_are_as_large_as_what_was_recorded(bench: ModelSet) -> None:
 def test_a_model_is_not_told_from_itself_but_from_one_without_friction(bench: ModelSet) -> None:
     hidden = with_effect(bench, "coulomb_friction@w_em", FRICTION)
     base = fit_first_base(hidden)
-    layers = {one.id: one for e in bench.effects for one in find_placements(bench.document, e)}
-    candidate = hidden.compile_candidate((layers["coulomb_friction@w_em"],))
+    candidate = hidden.compile_candidate((place_effect(bench, "coulomb_friction@w_em"),))
     start = {**base.values(0), "T_c_w_em": 1.0}
     friction = estimate_parameters(candidate, hidden.series, base.noise_levels, start)
     same = plan_experiment(hidden, [("a", friction), ("b", friction)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from unittest.mock import patch
 
 import pytest
 
@@ -11,7 +12,7 @@ from diagnosis.localisation.cause import attribute_causes, is_inactive
 from diagnosis.localisation.disturbance_state_fit import free_disturbance
 from diagnosis.localisation.location import Location, location_of, with_smoothed_disturbances
 from diagnosis.localisation.ranking import rank_causes_first
-from diagnosis.model.placed_effect import shipped_effects
+from tests.diagnosis.estimation import test_levenberg_marquardt
 from tests.diagnosis.estimation.test_levenberg_marquardt import FRICTION, bench
 from tests.diagnosis.localisation.test_ranking import fit_first_base, with_effect
 
@@ -21,9 +22,9 @@ __all__ = ["bench"]
 def missing(
     bench: ModelSet, effect: str, own: dict[str, float], drift: int
 ) -> tuple[ModelSet, Location]:
-    """Return recordings with an effect, and what the base lacks in a balance, over time."""
-    whole = dataclasses.replace(bench, effects=tuple(shipped_effects()))
-    hidden = with_effect(whole, effect, own)
+    """Return recordings of 10 s with an effect, and what the base lacks in a balance, over time."""
+    with patch.object(test_levenberg_marquardt, "COUNT", 2000):
+        hidden = with_effect(bench, effect, own)
     base, layer = fit_first_base(hidden), hidden.disturbances[drift]
     free = free_disturbance(hidden, base, layer)
     return hidden, with_smoothed_disturbances(hidden, location_of(hidden, "flow", layer, free))

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
+from fractions import Fraction
+
 import pytest
 
 from diagnosis.data.sampled_recording import SampledRecording
-from diagnosis.data.stacked_recordings import BURN_IN
+from diagnosis.data.stacked_recordings import burn_in_samples
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.levenberg_marquardt import estimate_parameters
 from diagnosis.estimation.model_set import ModelSet
@@ -14,12 +17,13 @@ from diagnosis.localisation.disturbance_state_fit import free_disturbance
 from diagnosis.localisation.location import Location, location_of
 from diagnosis.localisation.location_text import NO_LOCATION, format_location
 from diagnosis.localisation.ranking import localise, rank_accepted_first, rank_causes_first
-from diagnosis.model.placed_effect import disturbance_effect, find_placements
+from diagnosis.model.placed_effect import PlacedEffect, disturbance_effect
 from tests.diagnosis.estimation.test_levenberg_marquardt import (
     FRICTION,
     TRUTH,
     bench,
     ordinary_noise_levels,
+    place_effect,
     simulate_recordings,
 )
 
@@ -27,20 +31,18 @@ __all__ = ["bench"]
 
 
 def with_effect(bench: ModelSet, effect: str, own: dict[str, float]) -> ModelSet:
-    layers = {
-        layer.id: layer for e in bench.effects for layer in find_placements(bench.document, e)
-    }
-    truth = bench.compile_candidate((layers[effect],))
+    truth = bench.compile_candidate((place_effect(bench, effect),))
     series: tuple[SampledRecording, ...] = simulate_recordings(truth, {**TRUTH, **own})
-    return ModelSet(
-        bench.document,
-        bench.project,
-        bench.automaton,
-        (),
-        series,
-        bench.output_names,
-        bench.disturbances,
+    shown = dataclasses.replace(bench, effects=(), series=series, _compiled={})
+    disturbances = tuple(
+        dataclasses.replace(one, scales={"time": Fraction(1, 5)}) for one in bench.disturbances
     )
+    return dataclasses.replace(shown, disturbances=disturbances)  # as in recordings of 10 s
+
+
+def sensor_of(model_set: ModelSet) -> PlacedEffect:
+    """The disturbance of the wheel sensor."""
+    return model_set.scale_disturbance(disturbance_effect("output", "w_s"))
 
 
 def fit_first_base(bench: ModelSet) -> Estimate:
@@ -53,7 +55,7 @@ def fit_first_base(bench: ModelSet) -> Estimate:
 def test_a_sensor_is_not_taken_for_a_torque(bench: ModelSet) -> None:
     hidden = with_effect(bench, "sensor_lag@w_s", {"tau_w_s": 0.03})
     base = fit_first_base(hidden)
-    sensor = free_disturbance(hidden, base, disturbance_effect("output", "w_s"))
+    sensor = free_disturbance(hidden, base, sensor_of(hidden))
     assert sensor.cost < free_disturbance(hidden, base, hidden.disturbances[0]).cost - 100.0
 
 
@@ -75,12 +77,11 @@ def test_a_friction_is_no_sensor_and_told_with_its_size_and_what_it_goes_with(
     hidden = with_effect(bench, "coulomb_friction@w_em", FRICTION)
     base, layer = fit_first_base(hidden), hidden.disturbances[0]
     free = free_disturbance(hidden, base, layer)
-    assert (
-        free.cost < free_disturbance(hidden, base, disturbance_effect("output", "w_s")).cost - 100.0
-    )
+    assert free.cost < free_disturbance(hidden, base, sensor_of(hidden)).cost - 100.0
     locus = location_of(hidden, "flow", layer, free)
     assert locus.rms == pytest.approx(FRICTION["T_c_w_em"], rel=0.4)
-    assert all(start >= BURN_IN for start, _, _ in locus.windows)
+    burn_in = burn_in_samples(hidden.series[0]) * float(hidden.period)
+    assert all(start >= burn_in for start, _, _ in locus.windows)
     told = format_location(rank_accepted_first([locus], ["flow.w_em"], hidden), hidden)
     assert told.startswith("missing in the balance of w_em: ")
     assert "N*m rms" in told
