@@ -13,8 +13,8 @@ from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.estimate import Estimate
 
-MAX_LAG = 1.0
-"""Longest lag, in middle times of the recordings."""
+MAX_LAG = 1.25
+"""Longest lag, in reference times of the recordings."""
 
 
 def integrated_autocorrelation(model: Estimate, series: Sequence[SampledRecording]) -> float:

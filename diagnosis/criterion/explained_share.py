@@ -16,8 +16,6 @@ from diagnosis.estimation.estimate import Estimate
 
 FORM_ERROR = 0.3
 """Error of the form of an effect: standard deviation relative to the rms of the effect."""
-MIN_SHARE = 1.0 - FORM_ERROR**2 * (1.0 - math.log(FORM_ERROR**2))
-"""Explained share from which an effect is more probable than an unknown disturbance (0.69)."""
 FORM_SAMPLES = 16.0
 """Number of independent errors of the form of an effect (its degrees of freedom)."""
 MAX_ORDINARY_ENERGY = 1.0
@@ -56,6 +54,21 @@ def explained_share(model: Estimate, base: Estimate, floor: Reals) -> float:
     """
     whole = remaining_energy(base, floor)
     return 1.0 - remaining_energy(model, floor) / whole if whole > 0.0 else 0.0
+
+
+def least_share(total_gain: float = math.inf) -> float:
+    """Return the explained share from which an effect is more probable than an unknown disturbance.
+
+    It is where both have the same `log_form_weight`: 0.69 without noise, and less for a small
+    `total_gain` [nats] of the best model over the base.
+    """
+    noise = FORM_SAMPLES / (2.0 * max(total_gain, 1.0))
+    variance = FORM_ERROR**2 + noise
+    return 1.0 - variance * (1.0 + math.log((1.0 + noise) / variance)) + noise
+
+
+MIN_SHARE = least_share()
+"""Explained share from which an effect is more probable than an unknown disturbance (0.69)."""
 
 
 def log_form_weight(remaining: float | None, total_gain: float, parameters: int = 0) -> float:

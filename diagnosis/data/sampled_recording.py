@@ -33,6 +33,11 @@ MAX_SHARED_SLIP = Fraction(1, 4)
 """Slip at the end of a recording, in periods, with which it shares the grid of another one."""
 DECIMATED_PERIOD = Fraction(5, 1000)
 """Longest period [s] to which faster recordings are decimated."""
+REFERENCE_TIME = 0.2
+"""Time [s] of the mechanical motions that most recordings show."""
+MIN_PERIODS = 5.0
+"""Periods in a reference time, and reference times in a recording."""
+MIN_TIMES = 10.0
 DECIMATED_COUNT = 1500
 """Samples that a recording of median length keeps when it is decimated."""
 
@@ -59,15 +64,19 @@ class SampledRecording:
         return len(self.inputs)
 
     @property
-    def middle_time(self) -> float:
-        """The geometric mean [s] of the period and the length: the middle of the times that the
-        recording can show.
+    def reference_time(self) -> float:
+        """The time [s] of which burn-in, windows and memories of disturbances are multiples.
+
+        It is `REFERENCE_TIME` (0.2 s) if that is between five periods and a tenth of the length,
+        else the geometric mean of period and length.
         """
-        return float(self.period) * math.sqrt(max(self.count, 1))
+        period, length = float(self.period), float(self.period) * max(self.count, 1)
+        is_shown = MIN_PERIODS * period <= REFERENCE_TIME <= length / MIN_TIMES
+        return REFERENCE_TIME if is_shown else math.sqrt(period * length)
 
     def sample_count(self, multiple: float) -> int:
-        """Return the number of samples, at least 1, in a multiple of `middle_time`."""
-        return max(1, round(multiple * self.middle_time / float(self.period)))
+        """Return the number of samples, at least 1, in a multiple of `reference_time`."""
+        return max(1, round(multiple * self.reference_time / float(self.period)))
 
     @cached_property
     def first_measured(self) -> Reals:

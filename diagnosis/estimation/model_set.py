@@ -110,10 +110,10 @@ class ModelSet:
                     yield dataclasses.replace(placed_effect, scales=scales)
 
     def scale_disturbance(self, disturbance: PlacedEffect) -> PlacedEffect:
-        """Return a disturbance with the median middle time of the recordings as magnitude of its
+        """Return a disturbance with the median reference time of the recordings as magnitude of its
         place, rounded to one digit.
         """
-        middle = float(np.median([one.middle_time for one in self.series]))
+        middle = float(np.median([one.reference_time for one in self.series]))
         return dataclasses.replace(disturbance, scales={"time": Fraction(f"{middle:.0e}")})
 
     def try_compile(self, placed_effects: Sequence[PlacedEffect]) -> Candidate | None:

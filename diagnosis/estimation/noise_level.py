@@ -1,7 +1,7 @@
 """Noise levels: the unit of a disturbance, and the level of the ordinary disturbance.
 
-A disturbance of one unit changes a compared output by its own noise within the middle time of the
-recordings (`SampledRecording.middle_time`), about 0.2 s for recordings of 10 s.
+A disturbance of one unit changes a compared output by its own noise after the reference time of the
+recordings (`SampledRecording.reference_time`), about 0.2 s for recordings of 10 s.
 The level is held while effects are compared, because a fitted one absorbs the physics that is
 sought (docs/method.md).
 """
@@ -28,7 +28,7 @@ def disturbance_units(
 ) -> dict[str, float]:
     """Return the unit [SI] of each disturbance state, by name.
 
-    One unit changes some output by its measured noise after the median middle time, by the model
+    One unit changes some output by its measured noise after the median reference time, by the model
     linearised at the start of the first recording (at most 1e12 for a disturbance without
     response). `start` are values [SI] of parameters. Raises ValueError if the model cannot be
     linearised there.

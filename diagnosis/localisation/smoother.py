@@ -18,8 +18,8 @@ from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.kalman_gain import LocalModel, local_models
 
-AVERAGING_TIME = 4.0
-"""Middle times over which normalised squared innovations are averaged."""
+AVERAGING_TIME = 5.0
+"""Reference times over which normalised squared innovations are averaged."""
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,8 @@ def smooth_states(estimate: Estimate, series: Sequence[SampledRecording]) -> lis
     """Return the smoothed states of each recording to which a model was fitted.
 
     The standard deviations are multiplied by the root of the mean normalised square of innovations
-    over `AVERAGING_TIME` (4 middle times), where that exceeds 1. Samples after a run diverged are
-    left out.
+    over `AVERAGING_TIME` (5 reference times), where that exceeds 1. Samples after a run diverged
+    are left out.
     Raises ValueError if the model is unstable in every mode.
     """
     candidate, noise_levels = estimate.candidate, estimate.noise_levels

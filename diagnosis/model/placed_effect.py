@@ -181,9 +181,9 @@ def lower_tunable_program(
 
     The step divides the period into at least `min_substeps` and at most `MAX_STEPS` (40) parts and
     is at most `MAX_STEP` (5 ms) or the period. It is at most the `time_resolution` at the declared
-    parameters and with those of `effect_parameters` at a quarter and four times their values (within their
-    ranges), and not longer than any nonzero time among these: the eigenvalue of a limited rate is
-    not known beforehand.
+    parameters and with those of `effect_parameters` at a quarter and four times their values
+    (within their ranges), and not longer than any nonzero time among these: the eigenvalue of a
+    limited rate is not known beforehand.
     """
     scaled = [
         _scale_parameters(automaton, effect_parameters, factor)

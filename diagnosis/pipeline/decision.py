@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
+from diagnosis.criterion.explained_share import explained_share
 from diagnosis.criterion.threshold import Thresholds
 from diagnosis.equation.discovery import DiscoveredEquation, discover_equation
 from diagnosis.estimation.estimate import Estimate
@@ -30,6 +31,8 @@ from diagnosis.selection.intersample import LogCallback, fit_base
 from diagnosis.selection.output_error import fit_output_error, has_fading_memory
 from diagnosis.unknown_input.detection import detect_unknown_input
 
+MIN_SIMULATED_SHARE = 0.5
+"""Part of the error of whole simulations that an effect explains at least."""
 MIN_RIVAL_RATIO = 0.5
 """Probability of a rival of another name, relative to the accepted effect, that is ambiguous."""
 
@@ -60,7 +63,7 @@ def decide(case: Case, full_rate_set: ModelSet, log: LogCallback) -> DiagnosisDe
         log("the base forgets its initial state: whole recordings are simulated")
         found = fit_output_error(full_rate_set, base)
         selection = select_effects(found.model_set, found.base, case.thresholds, log)
-        if selection.accepted:
+        if selection.accepted and _explains_simulations(selection):
             model_set = dataclasses.replace(model_set, series=found.model_set.series)
             outcome = _outcome_of(selection, model_set)
             return DiagnosisDecision(
@@ -81,11 +84,20 @@ def decide(case: Case, full_rate_set: ModelSet, log: LogCallback) -> DiagnosisDe
     )
 
 
+def _explains_simulations(selection: Selection) -> bool:
+    """Return whether the first effect explains `MIN_SIMULATED_SHARE` (half) of the error of whole
+    simulations above the noise of the signals.
+    """
+    first, noise = selection.accepted[0].estimate, selection.base.noise_levels.outputs**2
+    assert first is not None
+    return explained_share(first, selection.base, noise) >= MIN_SIMULATED_SHARE
+
+
 def _outcome_of(selection: Selection, model_set: ModelSet) -> DecisionOutcome:
     """Return the outcome of a selection.
 
     Without an accepted effect it is `nothing_missing` if what the base leaves may be an ordinary
-    disturbance, else `unknown`. It is `ambiguous` if a rival of another name is at least
+    disturbance, else `unknown`. It is `ambiguous` if a rival of another name and family is at least
     `MIN_RIVAL_RATIO` (0.5) times as probable as the accepted effect.
     """
     if not selection.accepted:
@@ -96,6 +108,7 @@ def _outcome_of(selection: Selection, model_set: ModelSet) -> DecisionOutcome:
     name = verdict_id(best.placed_effect, automaton)
     is_open = any(
         verdict_id(one.placed_effect, automaton) != name
+        and one.placed_effect.effect.family != best.placed_effect.effect.family
         and probabilities[one.placed_effect.id] >= least
         for one in selection.rivals
     )

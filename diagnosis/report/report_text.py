@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from diagnosis.criterion.explained_share import MIN_SHARE
 from diagnosis.criterion.threshold import Thresholds
 from diagnosis.data_quality.finding import format_findings
 from diagnosis.estimation.quantity import Quantity
@@ -203,7 +202,7 @@ def format_reason(
         return f"gains less than {threshold:.0f} nats"
     share = f"explains {100.0 * max(candidate_fit.share, 0.0):.0f} % of what is unexplained"
     if not selection.accepted:
-        return f"{share}, {100.0 * MIN_SHARE:.0f} % are needed"
+        return f"{share}, {100.0 * selection.first.least_share:.0f} % are needed"
     return f"{share}, less than what was accepted" if rank else "not needed beside the others"
 
 

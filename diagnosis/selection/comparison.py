@@ -14,8 +14,10 @@ import numpy as np
 
 from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
 from diagnosis.criterion.explained_share import (
+    MIN_SHARE,
     explained_share,
     is_ordinary,
+    least_share,
     least_variances,
     remaining_energy,
 )
@@ -52,6 +54,14 @@ class Round:
         return is_ordinary(self.energy, len(self.floor))
 
     @property
+    def least_share(self) -> float:
+        """The share that an effect must explain.
+
+        If what the base leaves may be an ordinary disturbance, it is that without noise.
+        """
+        return MIN_SHARE if self.is_ordinary else least_share(self.total_gain)
+
+    @property
     def total_gain(self) -> float:
         """The gain [nats] of the model of least cost over the base."""
         fits = [one.estimate.cost for one in self.candidates if one.estimate is not None]
@@ -68,9 +78,9 @@ def compare_candidates(
 ) -> Round:
     """Return the comparison of effects beside a base.
 
-    No candidate is fitted if free disturbances show that the base leaves less than `least_energy`.
-    A base that is fitted by simulation has no free disturbance. Its floor is the noise of the
-    signals; beside accepted effects it is the best fit, so effects are compared with each other.
+    No candidate is fitted if the base leaves less than `least_energy` above its floor.
+    A base that is fitted by simulation has no free disturbance, so its effects are compared with
+    each other. Whether it leaves `least_energy` is measured above the noise of the signals.
     """
     is_simulated = base.noise_levels.is_output_error
     places = () if is_simulated else disturbance_locations(model_set, base)
@@ -79,14 +89,14 @@ def compare_candidates(
     }
     flexible = min(free.values(), key=lambda one: one.cost, default=base)
     start = extend_vector(base.candidate, flexible.candidate, flexible.point, {})
-    shown = remaining_energy(base, least_variances([base, *free.values()]))
-    if free and shown < least_energy:
+    floor = least_variances([base, *free.values()])
+    if is_simulated:
+        floor = np.minimum(floor, base.noise_levels.outputs**2)
+    if remaining_energy(base, floor) < least_energy:
         placed_effects = ()
     found = search_candidates(model_set, base, placed_effects, start, log)
     fits = [one.estimate for one in found if one.estimate is not None]
     floor = least_variances([base, *free.values(), *fits])
-    if is_simulated and not base.candidate.placed_effects:
-        floor = np.minimum(floor, base.noise_levels.outputs**2)
     best = min([base, *fits], key=lambda one: one.cost)
     correlation = integrated_autocorrelation(best, model_set.series)
     recordings = len(model_set.series)

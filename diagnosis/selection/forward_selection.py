@@ -18,6 +18,7 @@ from diagnosis.criterion.explained_share import (
     explained_share,
     is_ordinary,
     log_form_weight,
+    remaining_energy,
 )
 from diagnosis.criterion.threshold import DEFAULT_THRESHOLDS, Thresholds
 from diagnosis.estimation.estimate import Estimate
@@ -103,12 +104,12 @@ def select_effects(
     best = _best_candidate(model_set, first, thresholds)
     if best is None:
         return found
-    if best.share < MIN_SHARE:
+    if best.share < first.least_share:
         return _select_pair(model_set, found, best, thresholds, log)
     found = _accept(model_set, found, best, log)
     while len(found.accepted) < MAX_EFFECTS:
         best = _best_candidate(model_set, found.last, thresholds)
-        if best is None or best.share < MIN_SHARE:
+        if best is None or best.share < found.last.least_share:
             break
         found = _accept(model_set, found, best, log)
     return replace(found, rivals=_rivals(model_set, first, found.accepted[0]))
@@ -116,8 +117,11 @@ def select_effects(
 
 def tolerated_energy(first: Round) -> float:
     """Return the energy that accepted effects may leave: the error of their form, at most that of
-    an ordinary disturbance.
+    an ordinary disturbance. Whole simulations contain no ordinary disturbance.
     """
+    levels = first.base.noise_levels
+    if levels.is_output_error:
+        return FORM_ERROR**2 * remaining_energy(first.base, levels.outputs**2)
     return min(FORM_ERROR**2 * first.energy, MAX_ORDINARY_ENERGY * len(first.floor))
 
 
@@ -132,7 +136,7 @@ def _best_candidate(
     enough = [
         one for one in compared.candidates if one.gain >= thresholds.threshold_of(one.placed_effect)
     ]
-    explaining = [one for one in enough if one.share >= MIN_SHARE]
+    explaining = [one for one in enough if one.share >= compared.least_share]
     if not explaining:
         return next(iter(enough), None)
     simulating = _explain_simulations(model_set, compared, explaining)
@@ -198,7 +202,7 @@ def _select_pair(
     """Return the selection with two effects that together explain most; else without any."""
     pair = _accept(model_set, found, best, log)
     second = _best_candidate(model_set, pair.last, thresholds)
-    if second is not None and second.share >= MIN_SHARE:
+    if second is not None and second.share >= pair.last.least_share:
         return _accept(model_set, pair, second, log)
     log(f"not accepted {best.placed_effect.id}: it explains {100 * best.share:.0f} %")
     return found

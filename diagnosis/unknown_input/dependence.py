@@ -14,10 +14,10 @@ from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.data.stacked_recordings import burn_in_samples
 
-WINDOW_TIMES = (1.0, 4.0)
-"""Middle times in which an input has its response: at once, or as long as a limit acts."""
+WINDOW_TIMES = (1.5, 5.0)
+"""Reference times in which an input has its response: at once, or as long as a limit acts."""
 SMOOTHING_TIME = 0.25
-"""Middle times over which an input is averaged before its rate is taken: it has noise."""
+"""Reference times over which an input is averaged before its rate is taken: it has noise."""
 STANDSTILL_STDS = 0.1
 """Standard deviations of a signal within which it is near rest."""
 
@@ -68,7 +68,7 @@ def _amplitude_correlation(
 ) -> float:
     """Return the correlation of an amplitude with a feature, 0 where one of both is constant.
 
-    Both are averaged over a window [middle times] around each sample.
+    Both are averaged over a window [reference times] around each sample.
     """
     loud = [
         _moving_mean(np.abs(u), one, window) for u, one in zip(disturbances, series, strict=True)
@@ -103,7 +103,7 @@ def _input_amplitude(series: SampledRecording, column: int, count: int) -> Reals
 
 
 def _moving_mean(values: Reals, series: SampledRecording, window: float) -> Reals:
-    """Return means over a window [middle times] around each sample."""
+    """Return means over a window [reference times] around each sample."""
     count = max(3, series.sample_count(window))
     padded = np.pad(values, (count // 2, count - 1 - count // 2), mode="edge")
     return np.asarray(np.convolve(padded, np.full(count, 1.0 / count), "valid"), dtype=np.float64)

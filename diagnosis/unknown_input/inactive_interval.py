@@ -26,10 +26,10 @@ from diagnosis.localisation.disturbance_state_fit import (
 from diagnosis.model.parameter_vector import ParameterVector
 
 Booleans = NDArray[np.bool_]
-MARGIN = 2.0
-"""Middle times before and after an active interval that do not count as inactive."""
-MIN_DURATION = 8.0
-"""Shortest inactive interval, in middle times; the observer must find the states in it."""
+MARGIN = 2.5
+"""Reference times before and after an active interval that do not count as inactive."""
+MIN_DURATION = 10.0
+"""Shortest inactive interval, in reference times; the observer must find the states in it."""
 MIN_INACTIVE_FRACTION = 1.0 / 3.0
 """Smallest fraction of the samples that is inactive, for parameters to follow from it."""
 

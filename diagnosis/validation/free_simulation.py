@@ -20,10 +20,10 @@ from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.innovations import predict
 from diagnosis.validation.misfit import Misfit
 
-OBSERVED_TIME = 4.0
-"""Middle times of a recording with corrections by the observer."""
-FREE_TIME = 6.0
-"""Middle times of free simulation."""
+OBSERVED_TIME = 5.0
+"""Reference times of a recording with corrections by the observer."""
+FREE_TIME = 7.5
+"""Reference times of free simulation."""
 WINDOW_TIME = OBSERVED_TIME + FREE_TIME
 
 
@@ -84,8 +84,8 @@ def output_stds(series: Sequence[SampledRecording]) -> Reals:
 def simulate_free(model: Estimate, series: Sequence[SampledRecording]) -> list[Reals]:
     """Return the outputs of a model, observed and free in turn, (samples, outputs) each.
 
-    An observer corrects the model for `OBSERVED_TIME` (4 middle times), then it runs freely for
-    `FREE_TIME` (6 middle times). The samples after a run diverged are NaN.
+    An observer corrects the model for `OBSERVED_TIME` (5 reference times), then it runs freely for
+    `FREE_TIME` (7.5 reference times). The samples after a run diverged are NaN.
     """
     masked = [
         dataclasses.replace(one, measured=np.where(is_free(one)[:, None], np.nan, one.measured))

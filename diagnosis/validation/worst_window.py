@@ -71,7 +71,7 @@ def rms_by_recording(runs: FreeRuns) -> list[tuple[str, Reals, Reals]]:
 def find_worst_window(runs: FreeRuns, units: Sequence[str], label: str) -> WorstWindow:
     """Return the window with the largest sum of normalised squared errors of the base.
 
-    Windows are `WINDOW_TIME` (10 middle times) long and adjacent, the last one of a recording
+    Windows are `WINDOW_TIME` (12.5 reference times) long and adjacent, the last one of a recording
     may be shorter; only errors after `OBSERVED_TIME` count, over the standard deviation of the
     signal in all recordings. The first of equal windows is taken. `label` names the set of
     recordings in the title, `units` are those of the signals.

@@ -25,7 +25,7 @@ from language.text.node_edit import mapping_entries
 EffectLookup = Callable[[str, Span], Document]
 """Returns the document of the effect of a name; the span is where the name is written."""
 
-DESCRIPTION_KEYS = ("signature", "confused_with", "separated_by", "references")
+DESCRIPTION_KEYS = ("family", "signature", "confused_with", "separated_by", "references")
 """Keys of an effect with texts for reports."""
 ADDED_SECTIONS = (
     "parameters",
@@ -88,7 +88,11 @@ class PlacePattern:
 
 @dataclass(frozen=True)
 class Effect:
-    """A parametrised overlay: the places that it fits, its body, and texts for reports."""
+    """A parametrised overlay: the places that it fits, its body, and texts for reports.
+
+    Effects with the same `family` are forms of one phenomenon, and a diagnosis need not distinguish
+    them; it is the name of the effect if the file has none.
+    """
 
     name: str
     about: str
@@ -99,6 +103,7 @@ class Effect:
     separated_by: tuple[str, ...]
     references: tuple[str, ...]
     span: Span
+    family: str = ""
 
 
 @dataclass(frozen=True)
@@ -242,6 +247,7 @@ class _EffectReader(Reader):
             separated_by=self._read_texts(tree, "separated_by"),
             references=self._read_texts(tree, "references"),
             span=document.name_span,
+            family=tree.text_of("family") or document.name,
         )
 
     def _read_texts(self, tree: MappingNode, key: str) -> tuple[str, ...]:

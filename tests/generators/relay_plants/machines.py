@@ -160,7 +160,7 @@ def _supply(rng: Rng, kind: int, t: Array, low: float, high: float) -> Array:
         case _:
             turns = rng.uniform(2, 7)
             swing: Array = np.sin(2 * np.pi * turns * s)
-            return 0.5 * (low + high) + 0.45 * (b - a) * swing
+            return np.asarray(0.5 * (low + high) + 0.45 * (b - a) * swing)
 
 
 def _telegraph(rng: Rng, t: Array, longest: float, choices: tuple[float, ...] = (0.0,)) -> Array:

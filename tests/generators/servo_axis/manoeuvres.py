@@ -23,7 +23,7 @@ class Plan:
     @property
     def n(self) -> int:
         """Number of samples."""
-        return self.reference.shape[1]
+        return int(self.reference.shape[1])
 
 
 Speed = Callable[[np.random.Generator, Array, Machine], Array]
@@ -119,7 +119,7 @@ def _multisine(rng: np.random.Generator, t: Array, m: Machine) -> Array:
         0.9 * m.half / np.abs(place).max(),
         0.8 * m.a_max / np.abs(np.gradient(v, t)).max(),
     )
-    return scale * v
+    return np.asarray(scale * v)
 
 
 def _none(rng: np.random.Generator, t: Array, m: Machine) -> Array:
@@ -132,7 +132,7 @@ def _chirp(rng: np.random.Generator, t: Array, m: Machine) -> Array:
     span = t[-1] - REST
     late = np.clip(t - REST, 0, span)
     phase = low * late + (high - low) * late**2 / (2 * span)
-    return m.f_max * rng.uniform(0.3, 0.5) * np.sin(phase)
+    return np.asarray(m.f_max * rng.uniform(0.3, 0.5) * np.sin(phase))
 
 
 def _binary(rng: np.random.Generator, t: Array, m: Machine) -> Array:

@@ -49,13 +49,13 @@ def refit(m: Machine, runs: Sequence[Run]) -> Array:
     fit = least_squares(
         residual, start, bounds=(-2, 2), diff_step=1e-4, xtol=1e-4, ftol=1e-3, max_nfev=12
     )
-    return np.sqrt(np.sum(fit.fun.reshape(-1, len(noise)) ** 2, axis=0))
+    return np.asarray(np.sqrt(np.sum(fit.fun.reshape(-1, len(noise)) ** 2, axis=0)))
 
 
 def raw(m: Machine, runs: Sequence[Run], twins: Sequence[Run]) -> Array:
     """RMS difference of each signal to its clean twin over its noise, both without noise."""
     square = [(r.clean - t.clean) ** 2 for r, t in zip(runs, twins, strict=True)]
-    return np.sqrt(np.concatenate(square).mean(axis=0)) / np.array(m.noise)
+    return np.asarray(np.sqrt(np.concatenate(square).mean(axis=0)) / np.array(m.noise))
 
 
 def usable(m: Machine, runs: Sequence[Run]) -> bool:

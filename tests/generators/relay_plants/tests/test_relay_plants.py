@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,13 +27,14 @@ pytestmark = pytest.mark.long
 PACKAGE = Path(__file__).parents[1]
 
 
-def write(folder: Path, *options: str) -> dict[str, dict[str, object]]:
+def write(folder: Path, *options: str) -> dict[str, dict[str, Any]]:
     module = __package__.rpartition(".")[0]
     root = PACKAGE.parents[module.count(".")]
     command = [sys.executable, "-m", module, "--out", str(folder / "out")]
     command += ["--labels", str(folder / "labels.json"), "--seed", "5", *options]
     subprocess.run(command, check=True, cwd=root)
-    return json.loads((folder / "labels.json").read_text())["cases"]
+    cases: dict[str, dict[str, Any]] = json.loads((folder / "labels.json").read_text())["cases"]
+    return cases
 
 
 def files(folder: Path) -> dict[str, bytes]:
