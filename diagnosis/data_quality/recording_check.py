@@ -24,13 +24,11 @@ from diagnosis.data_quality.unit_sign_clock_errors import (
     agrees_with_other_outputs,
     find_unit_sign_clock_errors,
 )
-from engine.recordings.recording import Recording, split_by_windows
+from engine.recordings.recording import Recording
 from language.model.automaton import Automaton
 from language.model.system import RecordingMap
 
 ClockErrorSearch = Callable[[Sequence[Recording]], list[Finding] | None]
-MIN_DURATION = 2.0
-"""Shortest useful recording [s]; an observer needs 0.5 s of burn-in."""
 DISQUALIFYING_KINDS = ("no_signal", "too_short", "outlier", "leap", "time")
 """Kinds of findings after which a recording is not compared with the model."""
 MIN_SAMPLES = 100
@@ -231,21 +229,15 @@ def _find_insufficient_data(
 ) -> list[Finding]:
     """Return errors for recordings that are too short, and for missing excitation."""
     found = []
-    total = sum(
-        float(p.end - p.start) for recording in recordings for p in split_by_windows(recording)
-    )
     fewest = min((check.samples for check in checks), default=0)
     name = recordings[0].name if len(recordings) == 1 else ""
-    if total < MIN_DURATION or (fewest < MIN_SAMPLES and len(recordings) == 1):
-        text = (
-            f"{total:.3g} s and {fewest} samples of a channel are too short to tell effects apart"
-        )
+    if fewest < MIN_SAMPLES and len(recordings) == 1:
+        text = f"{fewest} samples of a channel are too few to tell effects apart"
         found.append(Finding("too_short", name, "", text, "error"))
     for recording in recordings if len(recordings) > 1 else ():
-        length = float(recording.end - recording.start)
         fewest = min((c.samples for c in checks if c.recording == recording.name), default=0)
-        if length < MIN_DURATION or fewest < MIN_SAMPLES:
-            text = f"{length:.3g} s and {fewest} samples of a channel are too short to be used"
+        if fewest < MIN_SAMPLES:
+            text = f"{fewest} samples of a channel are too few to be used"
             found.append(Finding("too_short", recording.name, "", text, "error"))
     if excitation.is_absent:
         names = ", ".join(f"`{signal.name}`" for signal in excitation.inputs) or "no input"

@@ -23,6 +23,9 @@ from diagnosis.estimation.normal_equations import NormalEquations, normal_equati
 from diagnosis.model.candidate import Candidate
 from diagnosis.model.parameter_vector import ParameterVector, all_values_at, values_at
 
+GAIN_SCALES = (0.0, 0.1, 0.25, 0.5, 0.7, 0.85, 1.2, 1.4)
+"""Factors of the Kalman gains that are tried; 0 is a simulation."""
+
 
 def share_operating_points(
     candidate: Candidate,
@@ -143,6 +146,22 @@ def evaluate_near(
     return min(
         first, evaluate(candidate, series, noise_levels, point, near), key=lambda one: one.cost
     )
+
+
+def with_best_gain_scale(estimate: Estimate, series: Sequence[SampledRecording]) -> Estimate:
+    """Return an estimate with its Kalman gains times the factor of `GAIN_SCALES` of least cost.
+
+    The steps of a fit hold the gains of an earlier point, so a parameter that scales an output can
+    adapt the gain to the noise. With a free factor all models that are compared can do so.
+    """
+    tried = [estimate]
+    for scale in GAIN_SCALES:
+        gains = KalmanGains(scale * estimate.gains.transient, scale * estimate.gains.steady_state)
+        other = dataclasses.replace(estimate, gains=gains)
+        prediction = predict_with_gains_of(other, series, estimate.point)
+        cost = prediction.negative_log_likelihood() + estimate.point.prior_cost(estimate.candidate)
+        tried.append(dataclasses.replace(other, prediction=prediction, cost=cost))
+    return min(tried, key=lambda one: one.cost)
 
 
 def with_normal_equations(

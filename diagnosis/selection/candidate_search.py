@@ -10,7 +10,12 @@ from functools import partial
 import numpy as np
 
 from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
-from diagnosis.estimation.estimate import Estimate, evaluate, with_normal_equations
+from diagnosis.estimation.estimate import (
+    Estimate,
+    evaluate,
+    with_best_gain_scale,
+    with_normal_equations,
+)
 from diagnosis.estimation.levenberg_marquardt import iterate, refine
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.model.candidate import Candidate
@@ -76,12 +81,14 @@ def search_candidates(
     count = MAX_FITS_BESIDE if base.candidate.placed_effects else len(screenings)
     found = []
     for rank, (placed_effect, screened) in enumerate(screenings):
-        candidate, gain, estimate = screened.candidate, base.cost - screened.cost, None
+        candidate, estimate = screened.candidate, None
+        gain = base.cost - with_best_gain_scale(screened, model_set.series).cost
         if gain >= MIN_SCREENING_GAIN and rank < count:
             fit = partial(_fit_fully, model_set, base, screened, flexible)
             given = [screened.point, screened.noise_levels, screened.gains, base.point, flexible]
             fitted = model_set.load_or_fit("fitted", candidate, given, fit)
-            estimate = fitted if np.isfinite(fitted.cost) else None
+            if np.isfinite(fitted.cost):
+                estimate = with_best_gain_scale(fitted, model_set.series)
         if estimate is not None:
             log(f"{placed_effect.id}: {base.cost - estimate.cost:.0f} nats")
         found.append(CandidateFit(placed_effect, gain, estimate))

@@ -131,7 +131,7 @@ def _best_candidate(
     """Return the candidate with the largest gain, None if it does not gain its threshold.
 
     Of the candidates that explain enough, it is the first one that also explains enough of what is
-    wrong in free simulations.
+    wrong in free simulations. Beside accepted effects there must be such a candidate.
     """
     enough = [
         one for one in compared.candidates if one.gain >= thresholds.threshold_of(one.placed_effect)
@@ -140,7 +140,8 @@ def _best_candidate(
     if not explaining:
         return next(iter(enough), None)
     simulating = _explain_simulations(model_set, compared, explaining)
-    return next(iter(simulating), explaining[0])
+    is_first = not compared.base.candidate.placed_effects
+    return next(iter(simulating), explaining[0] if is_first else None)
 
 
 def _explain_simulations(

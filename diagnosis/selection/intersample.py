@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from diagnosis.data.sampled_recording import SampledRecording, resample
-from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.estimate import Estimate, with_best_gain_scale
 from diagnosis.estimation.initial_input import average_initial_inputs, choose_initial_inputs
 from diagnosis.estimation.innovations import measured_noise_levels
 from diagnosis.estimation.levenberg_marquardt import estimate_parameters
@@ -41,7 +41,8 @@ def fit_base(model_set: ModelSet, log: LogCallback = lambda text: None) -> Fitte
     limits = HUBER_STDS * np.maximum(first.prediction.robust_std(), 1e-12)
     noise_levels = dataclasses.replace(first.noise_levels, huber_limits=limits)
     fit = partial(estimate_parameters, first.candidate, paced.series, noise_levels, first.point)
-    base = paced.load_or_fit("base", first.candidate, [first.point, noise_levels], fit)
+    fitted = paced.load_or_fit("base", first.candidate, [first.point, noise_levels], fit)
+    base = with_best_gain_scale(fitted, paced.series)
     text = "linear between samples" if paced.series[0].is_first_order_hold else "held"
     log(f"base fitted, inputs {text}: {base.cost:.0f} nats")
     return with_scales(paced, base), base

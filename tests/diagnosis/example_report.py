@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, cast
 
@@ -28,6 +30,7 @@ from diagnosis.selection.comparison import Round
 from diagnosis.selection.forward_selection import Selection
 from language.loading.recording_map_reader import read_map
 from language.overlays.effect_reader import added_names
+from language.overlays.effect_scale import SCALE_NAMES
 from language.overlays.expand_document import Project, expand_document, read_document
 from language.text.document import Document
 
@@ -55,7 +58,11 @@ def layers_of(project: Project, ids: Sequence[str]) -> list[PlacedEffect]:
     """Return effects at places, named `effect@place`."""
     base = base_of(project)
     known = {one.name: one for one in library_effects(project)}
-    fits = [layer for name in ids for layer in find_placements(base, known[name.partition("@")[0]])]
+    fits = [
+        dataclasses.replace(layer, scales=dict.fromkeys(SCALE_NAMES, Fraction(1)))
+        for name in ids
+        for layer in find_placements(base, known[name.partition("@")[0]])
+    ]
     return [next(layer for layer in fits if layer.id == name) for name in ids]
 
 

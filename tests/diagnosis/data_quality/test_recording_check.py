@@ -172,7 +172,7 @@ def test_a_clipped_and_a_stuck_signal_are_seen() -> None:
 
 def test_a_short_recording_and_a_still_one_tell_nothing_apart() -> None:
     assert ("error", "too_short", "") in finding_keys(
-        check(truncate_recording(spoil_recording(), 1))
+        check(truncate_recording(spoil_recording(), 0.5))
     )
     times, values = tip_in(constant=True)
     assert ("error", "no_excitation", "") in finding_keys(

@@ -41,6 +41,7 @@ class Search:
         self.lines: list[str] = []
         monkeypatch.setattr(ModelSet, "try_compile_all", self._compile)
         monkeypatch.setattr(candidate_search, "screen_candidate", self._screen)
+        monkeypatch.setattr(candidate_search, "with_best_gain_scale", lambda one, _: one)
         monkeypatch.setattr(candidate_search, "_fit_fully", self._fit)
 
     def run(self, more: Sequence[PlacedEffect] = ()) -> list[CandidateFit]:
