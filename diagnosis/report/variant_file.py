@@ -17,6 +17,8 @@ from diagnosis.selection.forward_selection import Selection
 from language.model.automaton import Automaton
 from language.overlays.effect_reader import Effect, added_names
 from language.overlays.expand_document import read_document
+from language.text.document import MappingNode
+from language.text.node_edit import mapping_entries
 
 NAME_SUFFIX = "_diagnosed"
 
@@ -131,7 +133,8 @@ def _single_effect_lines(
 ) -> list[str]:
     """Return the lines of an effect with its fitted values.
 
-    A parameter per recording has its mean, and the single values as a comment.
+    A parameter per recording has its mean, and the single values as a comment. Values that are
+    multiples of a magnitude and are not fitted are written too: a variant has no recordings.
     """
     placed_effect, own_names = (
         candidate_fit.placed_effect,
@@ -150,4 +153,12 @@ def _single_effect_lines(
         if parameter.fitting.per == "recording":
             note = "mean of " + ", ".join(f"{one[final]:.4g}" for one in each)
         values.append(f"      {own}: {text}  # {note}")
+    for entry in mapping_entries(placed_effect.effect.body.get("parameters")):
+        final = placed_effect.qualified_name(entry.key)
+        parameter = whole.parameters.get(final)
+        is_scaled = isinstance(entry.node, MappingNode) and "scale" in entry.node.entries
+        if is_scaled and final not in fitted and parameter is not None:
+            assert parameter.value is not None
+            text = format_value(float(parameter.value), parameter)
+            values.append(f"      {entry.key}: {text}  # from the recordings")
     return [*lines, "    values:", *values] if values else [f"  {placed_effect.id}: {{}}"]

@@ -27,10 +27,12 @@ from diagnosis.model.placed_effect import effect_names
 from diagnosis.selection.candidate_search import CandidateFit
 from diagnosis.selection.comparison import Round, compare_candidates
 from diagnosis.selection.intersample import LogCallback
-from diagnosis.validation.free_simulation import complete_nrmse
+from diagnosis.validation.free_simulation import complete_nrmse, window_statistic
 
 MAX_EFFECTS = 3
 """Largest number of accepted effects."""
+MIN_WINDOW_STATISTIC = 1.64
+"""Quantile of the normal distribution for a one-sided probability of 95 %."""
 SET_PROBABILITY = 0.95
 """Probability of the set of an effect and its rivals."""
 
@@ -131,7 +133,8 @@ def _best_candidate(
     """Return the candidate with the largest gain, None if it does not gain its threshold.
 
     Of the candidates that explain enough, it is the first one that also explains enough of what is
-    wrong in free simulations. Beside accepted effects there must be such a candidate.
+    wrong in free simulations. Beside accepted effects, and where the base leaves no more than an
+    ordinary disturbance, there must be such a candidate.
     """
     enough = [
         one for one in compared.candidates if one.gain >= thresholds.threshold_of(one.placed_effect)
@@ -140,17 +143,29 @@ def _best_candidate(
     if not explaining:
         return next(iter(enough), None)
     simulating = _explain_simulations(model_set, compared, explaining)
-    is_first = not compared.base.candidate.placed_effects
-    return next(iter(simulating), explaining[0] if is_first else None)
+    is_required = compared.is_ordinary or compared.base.candidate.placed_effects
+    return next(iter(simulating), None if is_required else explaining[0])
 
 
 def _explain_simulations(
     model_set: ModelSet, compared: Round, candidates: Sequence[CandidateFit]
 ) -> list[CandidateFit]:
-    """Return the candidates that explain enough of what is wrong in free simulations."""
+    """Return the candidates that explain enough of what is wrong in free simulations.
+
+    If what the base leaves may be an ordinary disturbance, they must also simulate significantly
+    better: `MIN_WINDOW_STATISTIC` (1.64, one-sided 95 %).
+    """
     shares = simulated_shares(model_set, compared.base, candidates)
     pairs = zip(candidates, shares, strict=True)
-    return [one for one, share in pairs if share >= MIN_SHARE]
+    found = [one for one, share in pairs if share >= MIN_SHARE]
+    if not compared.is_ordinary:
+        return found
+    return [
+        one
+        for one in found
+        if one.estimate is not None
+        and window_statistic(compared.base, one.estimate, model_set.series) > MIN_WINDOW_STATISTIC
+    ]
 
 
 def simulated_shares(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from fractions import Fraction
 from pathlib import Path
 from typing import Any, cast
 
@@ -30,9 +29,9 @@ from diagnosis.selection.comparison import Round
 from diagnosis.selection.forward_selection import Selection
 from language.loading.recording_map_reader import read_map
 from language.overlays.effect_reader import added_names
-from language.overlays.effect_scale import SCALE_NAMES
 from language.overlays.expand_document import Project, expand_document, read_document
 from language.text.document import Document
+from tests.diagnosis.estimation.test_levenberg_marquardt import SCALES
 
 BASE = "blind_driveline"
 MOVED = 0.2
@@ -59,7 +58,7 @@ def layers_of(project: Project, ids: Sequence[str]) -> list[PlacedEffect]:
     base = base_of(project)
     known = {one.name: one for one in library_effects(project)}
     fits = [
-        dataclasses.replace(layer, scales=dict.fromkeys(SCALE_NAMES, Fraction(1)))
+        dataclasses.replace(layer, scales=SCALES)
         for name in ids
         for layer in find_placements(base, known[name.partition("@")[0]])
     ]

@@ -152,7 +152,7 @@ def scale_channel(key: str, factor: float) -> Spoil:
     return spoil
 
 
-def truncate_recording(recording: Recording, seconds: int) -> Recording:
+def truncate_recording(recording: Recording, seconds: float) -> Recording:
     """The first seconds of a recording."""
     from engine.recordings.recording import crop
 

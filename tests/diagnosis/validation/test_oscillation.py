@@ -27,6 +27,7 @@ from language.loading.load import automaton_of
 from language.overlays.expand_document import Project, expand_document
 from language.text.diagnostic import Source
 from language.text.project_files import parse_document
+from tests.diagnosis.estimation.test_levenberg_marquardt import SCALES
 from tests.diagnosis.localisation.test_ranking import fit_first_base
 from tests.generators.open_cases.case import simulate_cases, stream
 from tests.generators.open_cases.recording import sample_recording
@@ -61,7 +62,7 @@ def fitted(bench: ModelSet) -> tuple[Estimate, dict[str, Estimate]]:
     for effect in bench.effects:
         for layer in find_placements(bench.document, effect):
             start = {**base.values(0), "k_r_half_shaft": 500.0, "F_r_half_shaft": 30.0}
-            one = bench.compile_candidate((layer,))
+            one = bench.compile_candidate((dataclasses.replace(layer, scales=SCALES),))
             found[effect.name] = estimate_parameters(one, bench.series, base.noise_levels, start)
     return base, found
 
