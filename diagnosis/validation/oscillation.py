@@ -17,6 +17,8 @@ from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.innovations import predict
 
+TREND_DEGREE = 3
+"""Degree of the polynomial that is removed before an oscillation is sought."""
 OBSERVED_TIME = 0.5
 """Shortest time [s] of observation before the step."""
 MAX_TIME = 2.5
@@ -223,9 +225,14 @@ def _largest_step(series: Sequence[SampledRecording]) -> tuple[int, int, int] | 
 
 
 def _cycle_samples(values: Reals, period: float) -> int | None:
-    """Return the number of samples of one cycle of the strongest oscillation; None without one."""
+    """Return the number of samples of one cycle of the strongest oscillation.
+
+    None without one, and for a simulation that diverged.
+    """
+    if len(values) <= TREND_DEGREE or not np.all(np.isfinite(values)):
+        return None
     time = np.arange(len(values))
-    rest = values - np.polyval(np.polyfit(time, values, 3), time)
+    rest = values - np.polyval(np.polyfit(time, values, TREND_DEGREE), time)
     rates = np.fft.rfftfreq(len(rest), period)
     power = np.abs(np.fft.rfft(rest * np.hanning(len(rest)))) ** 2
     power[(rates < MIN_FREQUENCY) | (rates > MAX_FREQUENCY)] = 0.0

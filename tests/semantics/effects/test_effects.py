@@ -172,12 +172,18 @@ def test_stribeck_friction_is_larger_at_low_speed(tmp_path: Path) -> None:
     assert rates[1] == pytest.approx(-4 / J * (1 + 0.5 * np.exp(-((1 / 2) ** 2))), rel=0.01)
 
 
+BRAKE = (
+    "{brake_drag@w: {values: {T_r: 3 N*m, share: 0.25, tau_b: 0.4 s, tau_p: 0.2 s, T_p: 10 N*m,"
+    " w_s: 0.1 rad/s}}}"
+)
+
+
 def test_a_brake_that_lets_go_slowly_is_a_load_that_fades(tmp_path: Path) -> None:
     """Nothing beside the brake while it is applied; then what its pads had come to, fading."""
     found = run_with_effects(
         tmp_path,
         "rotor",
-        "{brake_drag@w: {values: {T_r: 3 N*m, share: 0.25, tau_b: 0.4 s}}}",
+        BRAKE,
         {"T": "0 N*m", "T_b": "{start: 16 N*m, steps: {0.5 s: 0 N*m}}"},
         initial="{plant.w: 50 rad/s}",
         horizon="2 s",

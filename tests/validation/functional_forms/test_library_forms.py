@@ -95,7 +95,8 @@ TORQUES: list[tuple[str, str, Callable[[], Array]]] = [
         lambda: library.rate_limit(COURSE, MS, 250.0, 0.009),
     ),
     (
-        "torque_drift@T: {values: {drop: 0.3, tau_d: 1 s, load: 0.6, warm_0: 0.2}}", "u_w_T",
+        "torque_drift@T: {values: {drop: 0.3, tau_d: 1 s, load: 0.6, warm_0: 0.2, u_n: 100 N*m}}",
+        "u_w_T",
         lambda: library.drift(COURSE, MS, 0.3, 1.0, 0.6, 0.2),
     ),
     (
@@ -171,9 +172,15 @@ def test_of_a_loss(tmp_path: Path, effect: str, law: Callable[[Array, Array], Ar
     assert np.max(np.abs(lost - wanted)) < 5e-3 * np.max(np.abs(wanted))
 
 
+BRAKE = (
+    "{brake_drag@w: {values: {T_r: 3 N*m, share: 0.25, tau_b: 0.4 s, tau_p: 0.2 s, T_p: 10 N*m,"
+    " w_s: 0.1 rad/s}}}"
+)
+
+
 def test_of_a_brake_that_lets_go_slowly(tmp_path: Path) -> None:
     found = run_with_effects(
-        tmp_path, "rotor", "{brake_drag@w: {values: {T_r: 3 N*m, share: 0.25, tau_b: 0.4 s}}}",
+        tmp_path, "rotor", BRAKE,
         {"T": "0 N*m", "T_b": "{start: 16 N*m, steps: {0.5 s: 0 N*m}}"},
         initial="{plant.w: 50 rad/s}", more="outputs: [T_d_w]",
     )  # fmt: skip
@@ -226,7 +233,7 @@ def test_of_a_mount(tmp_path: Path) -> None:
 
 
 def test_of_a_second_gap(tmp_path: Path) -> None:
-    values = "{J_m: 0.5 kg*m^2, k_2: 20 kN*m/rad, c_2: 200 N*m*s/rad, a_2: 0.03 rad}"
+    values = "{J_m: 0.5 kg*m^2, k_2: 20 kN*m/rad, c_2: 200 N*m*s/rad, a_2: 0.03 rad, x_c: 3 mrad}"
     names = ("x_2_half_shaft", "rate_2_half_shaft", "T_2_half_shaft")
     found = run_with_effects(
         tmp_path, "driveline", f"{{second_gap@half_shaft: {{values: {values}}}}}",
