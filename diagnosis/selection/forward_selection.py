@@ -27,12 +27,12 @@ from diagnosis.model.placed_effect import effect_names
 from diagnosis.selection.candidate_search import CandidateFit
 from diagnosis.selection.comparison import Round, compare_candidates
 from diagnosis.selection.intersample import LogCallback
-from diagnosis.validation.free_simulation import complete_nrmse, window_statistic
+from diagnosis.validation.free_simulation import complete_nrmse
 
 MAX_EFFECTS = 3
 """Largest number of accepted effects."""
-MIN_WINDOW_STATISTIC = 1.64
-"""Quantile of the normal distribution for a one-sided probability of 95 %."""
+ORDINARY_THRESHOLD_FACTOR = 2.0
+"""Factor of the threshold if what the base leaves may be an ordinary disturbance."""
 SET_PROBABILITY = 0.95
 """Probability of the set of an effect and its rivals."""
 
@@ -132,40 +132,32 @@ def _best_candidate(
 ) -> CandidateFit | None:
     """Return the candidate with the largest gain, None if it does not gain its threshold.
 
+    The threshold is twice as large if what the base leaves may be an ordinary disturbance.
+
     Of the candidates that explain enough, it is the first one that also explains enough of what is
-    wrong in free simulations. Beside accepted effects, and where the base leaves no more than an
-    ordinary disturbance, there must be such a candidate.
+    wrong in free simulations. Beside accepted effects there must be such a candidate.
     """
+    factor = ORDINARY_THRESHOLD_FACTOR if compared.is_ordinary else 1.0
     enough = [
-        one for one in compared.candidates if one.gain >= thresholds.threshold_of(one.placed_effect)
+        one
+        for one in compared.candidates
+        if one.gain >= factor * thresholds.threshold_of(one.placed_effect)
     ]
     explaining = [one for one in enough if one.share >= compared.least_share]
     if not explaining:
         return next(iter(enough), None)
     simulating = _explain_simulations(model_set, compared, explaining)
-    is_required = compared.is_ordinary or compared.base.candidate.placed_effects
-    return next(iter(simulating), None if is_required else explaining[0])
+    is_first = not compared.base.candidate.placed_effects
+    return next(iter(simulating), explaining[0] if is_first else None)
 
 
 def _explain_simulations(
     model_set: ModelSet, compared: Round, candidates: Sequence[CandidateFit]
 ) -> list[CandidateFit]:
-    """Return the candidates that explain enough of what is wrong in free simulations.
-
-    If what the base leaves may be an ordinary disturbance, they must also simulate significantly
-    better: `MIN_WINDOW_STATISTIC` (1.64, one-sided 95 %).
-    """
+    """Return the candidates that explain enough of what is wrong in free simulations."""
     shares = simulated_shares(model_set, compared.base, candidates)
     pairs = zip(candidates, shares, strict=True)
-    found = [one for one, share in pairs if share >= MIN_SHARE]
-    if not compared.is_ordinary:
-        return found
-    return [
-        one
-        for one in found
-        if one.estimate is not None
-        and window_statistic(compared.base, one.estimate, model_set.series) > MIN_WINDOW_STATISTIC
-    ]
+    return [one for one, share in pairs if share >= MIN_SHARE]
 
 
 def simulated_shares(

@@ -101,34 +101,6 @@ def simulate_free(model: Estimate, series: Sequence[SampledRecording]) -> list[R
     return [p.outputs for p in prediction.predictions]
 
 
-def window_statistic(
-    before: Estimate, after: Estimate, series: Sequence[SampledRecording]
-) -> float:
-    """Return the t statistic by which free simulations with `after` are better than with `before`.
-
-    It is the mean over windows of the log ratio of squared errors, over its standard error. Errors
-    of outputs are divided by the root mean square error of `before`. The statistic is 0 for fewer
-    than two windows, and minus infinity if `after` diverges.
-    """
-    runs = [simulate_free(one, series) for one in (before, after)]
-    errors = [[one.measured - run for one, run in zip(series, rows, strict=True)] for rows in runs]
-    free = [is_free(one) for one in series]
-    first = np.concatenate([e[mask] for e, mask in zip(errors[0], free, strict=True)])
-    scale = np.maximum(np.sqrt(np.nanmean(first**2, axis=0)), 1e-300)
-    ratios = []
-    for r, one in enumerate(series):
-        length, mask = one.sample_count(WINDOW_TIME), free[r]
-        for start in range(0, one.count, length):
-            rows = np.flatnonzero(mask[start : start + length]) + start
-            squares = [float(np.nansum((e[r][rows] / scale) ** 2)) for e in errors]
-            if np.any(np.isnan(errors[1][r][rows]) & np.isfinite(one.measured[rows])):
-                return -np.inf
-            if min(squares) > 0.0:
-                ratios.append(np.log(squares[0] / squares[1]))
-    spread = float(np.std(ratios, ddof=1)) if len(ratios) > 1 else 0.0
-    return float(np.mean(ratios)) / (spread / np.sqrt(len(ratios))) if spread > 0.0 else 0.0
-
-
 def is_after_burn_in(series: SampledRecording) -> NDArray[np.bool_]:
     """Return the mask (samples,) of samples after the burn-in."""
     return np.asarray(np.arange(series.count) >= burn_in_samples(series))
