@@ -18,6 +18,9 @@ FORM_ERROR = 0.3
 """Error of the form of an effect: standard deviation relative to the rms of the effect."""
 FORM_SAMPLES = 16.0
 """Number of independent errors of the form of an effect (its degrees of freedom)."""
+NEGLIGIBLE_ENERGY = 0.02
+"""Energy of the remainder per channel below which no effect is sought: 2 % of the variance that
+nothing explains."""
 MAX_ORDINARY_ENERGY = 1.0
 """Energy of the remainder per channel up to which it may be an ordinary disturbance."""
 

@@ -15,6 +15,7 @@ import numpy as np
 from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
 from diagnosis.criterion.explained_share import (
     MIN_SHARE,
+    NEGLIGIBLE_ENERGY,
     explained_share,
     is_ordinary,
     least_share,
@@ -52,6 +53,11 @@ class Round:
     def is_ordinary(self) -> bool:
         """Whether what the base leaves may be an ordinary disturbance."""
         return is_ordinary(self.energy, len(self.floor))
+
+    @property
+    def is_negligible(self) -> bool:
+        """Whether the base leaves too little for an effect."""
+        return self.energy < NEGLIGIBLE_ENERGY * len(self.floor)
 
     @property
     def least_share(self) -> float:

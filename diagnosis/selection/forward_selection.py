@@ -31,8 +31,6 @@ from diagnosis.validation.free_simulation import complete_nrmse
 
 MAX_EFFECTS = 3
 """Largest number of accepted effects."""
-ORDINARY_THRESHOLD_FACTOR = 2.0
-"""Factor of the threshold if what the base leaves may be an ordinary disturbance."""
 SET_PROBABILITY = 0.95
 """Probability of the set of an effect and its rivals."""
 
@@ -132,16 +130,15 @@ def _best_candidate(
 ) -> CandidateFit | None:
     """Return the candidate with the largest gain, None if it does not gain its threshold.
 
-    The threshold is twice as large if what the base leaves may be an ordinary disturbance.
+    There is none either if what the base leaves is negligible.
 
     Of the candidates that explain enough, it is the first one that also explains enough of what is
     wrong in free simulations. Beside accepted effects there must be such a candidate.
     """
-    factor = ORDINARY_THRESHOLD_FACTOR if compared.is_ordinary else 1.0
+    if compared.is_negligible:
+        return None
     enough = [
-        one
-        for one in compared.candidates
-        if one.gain >= factor * thresholds.threshold_of(one.placed_effect)
+        one for one in compared.candidates if one.gain >= thresholds.threshold_of(one.placed_effect)
     ]
     explaining = [one for one in enough if one.share >= compared.least_share]
     if not explaining:
