@@ -79,6 +79,6 @@ def test_without_recordings_and_value_the_magnitude_is_1_and_there_is_no_range()
     ],
 )
 def test_a_wrong_scale_is_refused(scale: str, text: str, label: str) -> None:
-    with pytest.raises(SpecError, match=None) as caught:
+    with pytest.raises(SpecError) as caught:
         body_of(scale, text)
     assert any(label in problem.label for problem in caught.value.problems)
