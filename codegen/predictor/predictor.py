@@ -82,7 +82,7 @@ def load_predictor_library(path: Path) -> Any:
     library.modewright_differences.restype = None
     library.modewright_predict.argtypes = [
         *(pointer, pointer, pointer, pointer, whole, pointer),
-        *(whole, whole, ctypes.c_int, pointer, pointer, pointer, pointer, pointer),
+        *(whole, whole, pointer, pointer, pointer, pointer, pointer, pointer),
     ]
     library.modewright_predict.restype = whole
     library.modewright_predict_all.argtypes = [
@@ -219,7 +219,7 @@ class Predictor:
         first_gains: Reals,
         gains: Reals,
         substeps: int,
-        is_first_order_hold: bool,
+        linear_inputs: NDArray[np.int64],
         state_increments: Reals | None = None,
     ) -> Prediction:
         """Return the prediction of one recording; all arrays are C-contiguous float64.
@@ -227,9 +227,10 @@ class Predictor:
         `page` (tunables,), `inputs` (samples, inputs), `measured` (samples, outputs) with NaN where
         nothing was measured, which corrects nothing. `first_gains` (first, states, outputs) apply
         to the first samples, `gains` (modes, states, outputs) to all others. `substeps` is the
-        number of major steps from sample to sample. With `is_first_order_hold` inputs are linear
-        between samples, else constant. `state_increments` (samples, states) are added to the
-        corrected states. After a divergence `completed` is smaller than the number of samples.
+        number of major steps from sample to sample. An input is linear between samples where
+        `linear_inputs` (inputs,) is not 0, else constant. `state_increments` (samples, states) are
+        added to the corrected states. After a divergence `completed` is smaller than the number of
+        samples.
         """
         samples = len(inputs)
         innovations = np.full((samples, len(self.outputs)), np.nan)
@@ -245,7 +246,7 @@ class Predictor:
             _address(gains),
             samples,
             substeps,
-            int(is_first_order_hold),
+            _address(linear_inputs),
             None if state_increments is None else _address(state_increments),
             _address(innovations),
             _address(outputs),
@@ -320,7 +321,7 @@ class Predictor:
         `limits` (outputs,) counts as L (2 |e| - L) (Huber 1964). Samples of the burn-in and NaN are
         left out of both.
         """
-        shape = (len(recordings.is_first_order_hold), len(self.outputs))
+        shape = (len(recordings.burn_in), len(self.outputs))
         squares, counts = np.empty(shape), np.empty(shape)
         self._library.modewright_squares(
             *(
@@ -348,7 +349,7 @@ class Predictor:
         that is not wanted.
         """
         first, steady = gains
-        starts, linear = recordings.starts, recordings.is_first_order_hold
+        starts, linear = recordings.starts, recordings.linear_inputs
         is_per_point = int(steady.ndim > STEADY_GAIN_DIMENSIONS)
         self._library.modewright_predict_all(
             *(_address(a) for a in (pages, recordings.inputs, recordings.measured, first)),

@@ -35,15 +35,15 @@ class StackedRecordings:
 
     `inputs` has the shape (samples, inputs) and `measured` (samples, outputs), with NaN where
     nothing was measured. Recording r has the samples from `starts[r]` up to `starts[r + 1]`. Its
-    first `burn_in[r]` samples do not count in sums. Its inputs are linear between samples if
-    `is_first_order_hold[r]`, else constant.
+    first `burn_in[r]` samples do not count in sums. Its input i is linear between samples if
+    `linear_inputs[r, i]`, else constant.
     """
 
     inputs: Reals
     measured: Reals
     starts: Integers
     burn_in: Integers
-    is_first_order_hold: Integers
+    linear_inputs: Integers
 
 
 @dataclass(frozen=True)

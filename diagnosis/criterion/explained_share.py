@@ -10,13 +10,18 @@ import math
 from collections.abc import Iterable
 
 import numpy as np
+from scipy.optimize import brentq
 
 from diagnosis.data.array_types import Reals
 from diagnosis.estimation.estimate import Estimate
 
-FORM_ERROR = 0.3
-"""Error of the form of an effect: standard deviation relative to the rms of the effect."""
-FORM_SAMPLES = 16.0
+LEAST_FORM_ERROR = 0.01
+"""Least error of the form of an effect: standard deviation relative to the rms of the effect."""
+FORM_ERROR = 0.4
+"""Largest error of the form of an effect; its logarithm is uniform."""
+USUAL_FORM_ERROR: float = FORM_ERROR**0.9 * LEAST_FORM_ERROR ** (1 - 0.9)
+"""Error of the form that 9 of 10 effects do not exceed (0.28)."""
+FORM_SAMPLES = 8.0
 """Number of independent errors of the form of an effect (its degrees of freedom)."""
 NEGLIGIBLE_ENERGY = 0.02
 """Energy of the remainder per channel below which no effect is sought: 2 % of the variance that
@@ -59,33 +64,47 @@ def explained_share(model: Estimate, base: Estimate, floor: Reals) -> float:
     return 1.0 - remaining_energy(model, floor) / whole if whole > 0.0 else 0.0
 
 
-def least_share(total_gain: float = math.inf) -> float:
+def sampled_energy(base: Estimate, floor: Reals, correlation: float) -> float:
+    """Return the energy that a base leaves, each channel times its number of independent samples.
+
+    `correlation` is the number of samples that count as one.
+    """
+    excess = np.maximum(base.prediction.variances / floor - 1.0, 0.0)
+    return float(np.sum(base.prediction.counts * excess)) / correlation
+
+
+def least_share(energy: float = math.inf) -> float:
     """Return the explained share from which an effect is more probable than an unknown disturbance.
 
-    It is where both have the same `log_form_weight`: 0.69 without noise, and less for a small
-    `total_gain` [nats] of the best model over the base.
+    It is where both have the same `log_form_weight`: 0.70 without noise, and less for a small
+    `sampled_energy`.
     """
-    noise = FORM_SAMPLES / (2.0 * max(total_gain, 1.0))
-    variance = FORM_ERROR**2 + noise
-    return 1.0 - variance * (1.0 + math.log((1.0 + noise) / variance)) + noise
+    unknown = log_form_weight(None, energy)
+
+    def advantage(remaining: float) -> float:
+        return log_form_weight(remaining, energy) - unknown
+
+    return 1.0 - float(brentq(advantage, 0.0, 1.0)) if advantage(1.0) < 0.0 else 0.0
+
+
+def log_form_weight(remaining: float | None, energy: float, parameters: int = 0) -> float:
+    """Return the logarithm of the posterior mass of an effect that leaves a part of the energy.
+
+    The errors of the form are `FORM_SAMPLES` (8) normal variables. Their standard deviation,
+    relative to the effect, has a uniform logarithm from `LEAST_FORM_ERROR` (0.01) to `FORM_ERROR`
+    (0.4). The noise adds FORM_SAMPLES / energy to their variance; `energy` is the `sampled_energy`
+    of the base. None for `remaining` gives the weight of an unknown disturbance, whose variance is
+    the one that fits best. Each of the `parameters` of the effect costs log(FORM_SAMPLES) / 2.
+    """
+    noise = FORM_SAMPLES / max(energy, 1.0)
+    if remaining is None:
+        return -FORM_SAMPLES / 2.0 * (math.log(1.0 + noise) + 1.0)
+    ends = np.geomspace(LEAST_FORM_ERROR, FORM_ERROR)
+    variances = ends[1:] * ends[:-1] + noise
+    misfits = np.log(variances) + (max(remaining, 0.0) + noise) / variances
+    mass = float(np.logaddexp.reduce(-FORM_SAMPLES / 2.0 * misfits)) - math.log(len(variances))
+    return mass - parameters / 2.0 * math.log(FORM_SAMPLES)
 
 
 MIN_SHARE = least_share()
-"""Explained share from which an effect is more probable than an unknown disturbance (0.69)."""
-
-
-def log_form_weight(remaining: float | None, total_gain: float, parameters: int = 0) -> float:
-    """Return the logarithm of the posterior mass of an effect that leaves a part of the energy.
-
-    The errors of the form are `FORM_SAMPLES` (16) normal variables of variance `FORM_ERROR`^2
-    relative to the effect, plus that of the noise, FORM_SAMPLES / (2 total_gain). `total_gain`
-    [nats] is the gain of the best model over the base. None for `remaining` gives the weight of an
-    unknown disturbance, whose variance is the one that fits best. Each of the `parameters` of the
-    effect costs log(FORM_SAMPLES) / 2.
-    """
-    noise = FORM_SAMPLES / (2.0 * max(total_gain, 1.0))
-    variance = FORM_ERROR**2 + noise
-    if remaining is None:
-        variance, remaining = 1.0 + noise, 1.0
-    misfit = math.log(variance) + (max(remaining, 0.0) + noise) / variance
-    return -FORM_SAMPLES / 2.0 * misfit - parameters / 2.0 * math.log(FORM_SAMPLES)
+"""Explained share from which an effect is more probable than an unknown disturbance (0.70)."""

@@ -3,7 +3,8 @@
 The grid has the period of the fastest channel and begins at a sample of a compared channel. Each
 measured value belongs to its nearest sample; a compared channel is NaN at samples without a value.
 An input is held (zero-order hold), or linear between its time stamps if the recording map says
-`hold: linear`.
+`hold: linear`. An input with two values is held, and without `hold` in the map the others may be
+either.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,13 +44,18 @@ DECIMATED_COUNT = 1500
 """Samples that a recording of median length keeps when it is decimated."""
 
 
+Hold = Literal["previous", "linear"] | None
+"""Behaviour of an input between samples; None if it is not known."""
+
+
 @dataclass(frozen=True)
 class SampledRecording:
     """A recording on a uniform grid: `inputs` (samples, inputs) and `measured` (samples, outputs).
 
     `measured` is NaN where an output has no value. `period` is the time [s] between samples and
-    `start` the time [s] of the first one. With `is_first_order_hold`, inputs are linear between
-    samples instead of constant.
+    `start` the time [s] of the first one. Between samples an input is linear if its entry of
+    `holds` is "linear", constant if it is "previous", and without an entry (None) linear with
+    `is_first_order_hold`, else constant.
     """
 
     name: str
@@ -57,11 +64,24 @@ class SampledRecording:
     inputs: Reals
     measured: Reals
     is_first_order_hold: bool = False
+    holds: tuple[Hold, ...] = ()
 
     @property
     def count(self) -> int:
         """The number of samples."""
         return len(self.inputs)
+
+    @property
+    def linear_inputs(self) -> NDArray[np.int64]:
+        """Whether each input is linear between samples, 1 or 0 (inputs,)."""
+        known = self.holds or (None,) * self.inputs.shape[1]
+        chosen: Hold = "linear" if self.is_first_order_hold else "previous"
+        return np.array([(one or chosen) == "linear" for one in known], dtype=np.int64)
+
+    @property
+    def has_open_hold(self) -> bool:
+        """Whether the behaviour of an input between samples depends on `is_first_order_hold`."""
+        return None in self.holds or not self.holds
 
     @property
     def reference_time(self) -> float:
@@ -138,8 +158,7 @@ def sample_recording(
     are known, and ends with the channel that ends first. The columns are `inputs` and
     `output_names` in their order: an input without a channel is constant at its value in `defaults`
     (KeyError without one), an output without a channel is NaN. Other channels are ignored. Raises
-    ValueError if a used channel has fewer than two values or the grid fewer than two samples. The
-    inputs are marked as held between samples, whatever the map says.
+    ValueError if a used channel has fewer than two values or the grid fewer than two samples.
     """
     input_channels = {
         c.column.to: c for c in recording.channels.values() if c.column.to is not None
@@ -175,7 +194,18 @@ def sample_recording(
         start,
         np.ascontiguousarray(input_values.T),
         np.ascontiguousarray(output_values.T),
+        holds=tuple(
+            _hold_of(input_channels.get(name), values)
+            for name, values in zip(inputs, input_values, strict=True)
+        ),
     )
+
+
+def _hold_of(channel: Channel | None, values: Reals) -> Hold:
+    """Return the hold of an input by its map; an input with at most two values is held."""
+    if channel is not None and channel.column.hold is not None:
+        return channel.column.hold
+    return "previous" if np.all((values == np.min(values)) | (values == np.max(values))) else None
 
 
 def has_feedthrough(automaton: Automaton, output_names: Sequence[str]) -> bool:
@@ -190,6 +220,11 @@ def has_feedthrough(automaton: Automaton, output_names: Sequence[str]) -> bool:
             edges.setdefault(name, set()).update(formula.reads)
     read = [reachable(edges, automaton.output_source(name)) for name in output_names]
     return bool(set(automaton.inputs) & set().union(*read))
+
+
+def open_holds(series: Sequence[SampledRecording]) -> tuple[bool, ...]:
+    """Return the values of `is_first_order_hold` that differ in their meaning for recordings."""
+    return (True, False) if any(one.has_open_hold for one in series) else (False,)
 
 
 def resample(
@@ -247,8 +282,8 @@ def _has_period(series: SampledRecording, period: Fraction) -> bool:
 def interpolate(series: SampledRecording, period: Fraction) -> SampledRecording:
     """Return a recording at another period [s], with signals linear between its samples.
 
-    Samples next to an unknown value (NaN) are unknown. The last sample is not after that of
-    `series`.
+    An input whose hold is "previous" keeps its value until the next sample instead. Samples next to
+    an unknown value (NaN) are unknown. The last sample is not after that of `series`.
     """
     count = int((series.count - 1) * series.period / period) + 1
     places = np.arange(count) * float(period / series.period)
@@ -260,8 +295,11 @@ def interpolate(series: SampledRecording, period: Fraction) -> SampledRecording:
         step = np.where(part > 0.0, part * (values[after] - values[before]), 0.0)
         return np.ascontiguousarray(values[before] + step)
 
+    inputs = at_places(series.inputs)
+    held = [k for k, hold in enumerate(series.holds) if hold == "previous"]
+    inputs[:, held] = series.inputs[before][:, held]
     return dataclasses.replace(
-        series, period=period, inputs=at_places(series.inputs), measured=at_places(series.measured)
+        series, period=period, inputs=inputs, measured=at_places(series.measured)
     )
 
 
@@ -278,26 +316,25 @@ def decimate(
     of n samples (n + 1 if n is even), with the edge values repeated. The cost of a fit is
     proportional to the number of samples. Raises ValueError for fewer than n samples.
     """
+    series = dataclasses.replace(series, is_first_order_hold=is_first_order_hold)
     factor = max(1, int(longest / series.period))
     count = series.count // factor
     if count == 0:
         raise ValueError(
             f"{series.name}: only {series.count} samples, {factor} are averaged to one"
         )
-    inputs = series.inputs[: count * factor]
-    if is_first_order_hold and factor > 1:
-        around = np.pad(inputs, ((factor // 2, factor // 2), (0, 0)), mode="edge")
+    recorded = series.inputs[: count * factor]
+    inputs = np.mean(recorded.reshape(count, factor, -1), axis=1)
+    linear = np.flatnonzero(series.linear_inputs)
+    if len(linear) and factor > 1:
+        around = np.pad(recorded[:, linear], ((factor // 2, factor // 2), (0, 0)), mode="edge")
         windows = np.lib.stride_tricks.sliding_window_view(around, 2 * (factor // 2) + 1, axis=0)
-        inputs = np.mean(windows[::factor], axis=-1)
-    else:
-        inputs = np.mean(inputs.reshape(count, factor, -1), axis=1)
-    return SampledRecording(
-        series.name,
-        series.period * factor,
-        series.start,
-        np.ascontiguousarray(inputs),
-        np.ascontiguousarray(series.measured[: count * factor : factor]),
-        is_first_order_hold,
+        inputs[:, linear] = np.mean(windows[::factor], axis=-1)
+    return dataclasses.replace(
+        series,
+        period=series.period * factor,
+        inputs=np.ascontiguousarray(inputs),
+        measured=np.ascontiguousarray(series.measured[: count * factor : factor]),
     )
 
 

@@ -65,6 +65,6 @@ def _stack(series: tuple[SampledRecording, ...]) -> StackedExperiments:
         np.concatenate([one.measured for one in series]),
         np.cumsum([0, *counts], dtype=np.int64),
         np.array([min(burn_in_samples(one), one.count) for one in series], dtype=np.int64),
-        np.array([one.is_first_order_hold for one in series], dtype=np.int64),
+        np.array([one.linear_inputs for one in series], dtype=np.int64),
     )
     return StackedExperiments(series, recorded, np.array([one.first_measured for one in series]))

@@ -133,6 +133,7 @@ def _to_arrays(estimate: Estimate) -> Arrays:
         "noise_inputs": estimate.noise_levels.inputs,
         "noise_limits": estimate.noise_levels.huber_limits,
         "is_alone": estimate.noise_levels.is_output_error,
+        "gain_scale": estimate.noise_levels.gain_scale,
         "drift_names": np.array(list(drifts), dtype=str),
         "drift_levels": np.array(list(drifts.values()), dtype=float),
         "limits": estimate.prediction.huber_limits,
@@ -156,7 +157,12 @@ def _from_arrays(
     }
     is_alone = bool(arrays["is_alone"])
     noise_levels = NoiseLevels(
-        arrays["noise_seen"], arrays["noise_inputs"], drifts, arrays["limits"], is_alone
+        arrays["noise_seen"],
+        arrays["noise_inputs"],
+        drifts,
+        arrays["limits"],
+        is_alone,
+        float(arrays["gain_scale"]),
     )
     point, gains = (
         ParameterVector(arrays["shared"], arrays["own"]),

@@ -23,7 +23,7 @@ from diagnosis.estimation.normal_equations import NormalEquations, normal_equati
 from diagnosis.model.candidate import Candidate
 from diagnosis.model.parameter_vector import ParameterVector, all_values_at, values_at
 
-GAIN_SCALES = (0.0, 0.1, 0.25, 0.5, 0.7, 0.85, 1.2, 1.4)
+GAIN_SCALES = (0.0, 0.1, 0.25, 0.5, 0.7, 0.85, 1.0, 1.2, 1.4)
 """Factors of the Kalman gains that are tried; 0 is a simulation."""
 
 
@@ -111,7 +111,7 @@ def evaluate(
     if nearby is None:
         seen = prediction
         if not seen.is_complete:
-            seen = predict_at(candidate, series, point, gains.without_correction, noise_levels)
+            seen = predict_at(candidate, series, point, gains.scaled(0.0), noise_levels)
         if seen.is_complete:
             gains = kalman_gains(candidate, series, values, noise_levels, seen)
             prediction = predict_at(candidate, series, point, gains, noise_levels)
@@ -149,15 +149,26 @@ def evaluate_near(
 
 
 def with_best_gain_scale(estimate: Estimate, series: Sequence[SampledRecording]) -> Estimate:
-    """Return an estimate with its Kalman gains times the factor of `GAIN_SCALES` of least cost.
+    """Return an estimate with the factor of its Kalman gains in `GAIN_SCALES` of least cost.
 
     The steps of a fit hold the gains of an earlier point, so a parameter that scales an output can
-    adapt the gain to the noise. With a free factor all models that are compared can do so.
+    adapt the gain to the noise. With a free factor all models that are compared can do so. The
+    factor is part of the noise levels of the result. A simulation has no gains and is returned.
     """
-    tried = [estimate]
+    levels, tried = estimate.noise_levels, [estimate]
+    if levels.is_output_error or not np.isfinite(estimate.cost):
+        return estimate
+    if levels.gain_scale > 0.0:
+        whole = estimate.gains.scaled(1.0 / levels.gain_scale)
+    else:
+        values, levels = estimate.values(0), dataclasses.replace(levels, gain_scale=1.0)
+        whole = kalman_gains(estimate.candidate, series, values, levels, estimate.prediction)
     for scale in GAIN_SCALES:
-        gains = KalmanGains(scale * estimate.gains.transient, scale * estimate.gains.steady_state)
-        other = dataclasses.replace(estimate, gains=gains)
+        other = dataclasses.replace(
+            estimate,
+            gains=whole.scaled(scale),
+            noise_levels=dataclasses.replace(levels, gain_scale=scale),
+        )
         prediction = predict_with_gains_of(other, series, estimate.point)
         cost = prediction.negative_log_likelihood() + estimate.point.prior_cost(estimate.candidate)
         tried.append(dataclasses.replace(other, prediction=prediction, cost=cost))

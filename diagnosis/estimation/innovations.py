@@ -30,7 +30,8 @@ class NoiseLevels:
 
     Innovations beyond `huber_limits` (outputs,) count linearly instead of quadratically (Huber
     1964), so that an event predicted one sample late does not dominate. With `is_output_error` the
-    states are not corrected after the burn-in, so innovations are the errors of a simulation.
+    states are not corrected after the burn-in, so innovations are the errors of a simulation. The
+    Kalman gains that follow from the levels are multiplied by `gain_scale`.
     """
 
     outputs: Reals
@@ -38,6 +39,7 @@ class NoiseLevels:
     process: Mapping[str, float]
     huber_limits: Reals
     is_output_error: bool = False
+    gain_scale: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -50,10 +52,9 @@ class KalmanGains:
     transient: Reals
     steady_state: Reals
 
-    @property
-    def without_correction(self) -> KalmanGains:
-        """Gains of 0: a simulation."""
-        return KalmanGains(np.zeros_like(self.transient), np.zeros_like(self.steady_state))
+    def scaled(self, factor: float) -> KalmanGains:
+        """Return the gains times a factor; 0 gives a simulation."""
+        return KalmanGains(factor * self.transient, factor * self.steady_state)
 
 
 @dataclass(frozen=True)

@@ -80,7 +80,7 @@ def kalman_gains(
             for mode in modes
         ]
     )
-    return KalmanGains(first, np.ascontiguousarray(steady))
+    return KalmanGains(first, np.ascontiguousarray(steady)).scaled(noise_levels.gain_scale)
 
 
 def local_models(

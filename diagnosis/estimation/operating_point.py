@@ -153,7 +153,7 @@ def _initial_operating_point(
     none = np.zeros((len(predictor.modes), len(predictor.states), len(predictor.outputs)))
     short, measured = series.inputs[:2].copy(), series.measured[:2].copy()
     run = predictor.predict(
-        page, short, measured, none[:0], none, candidate.compiled.substeps, False
+        page, short, measured, none[:0], none, candidate.compiled.substeps, series.linear_inputs
     )
     return {int(run.modes[0]): OperatingPoint(run.states[0].copy(), short[0], 1)}
 

@@ -25,6 +25,8 @@ from language.overlays.effect_place import EffectPlace, find_effect_place
 DECORRELATED = 0.5
 """Half the mean square difference of two samples, relative to the variance, at which they count as
 independent of each other."""
+MIN_TIME = 30.0
+"""Least magnitude of a time in periods: shorter delays and lags hardly show."""
 LAG_RATIO = 1.2
 """Ratio between successive lags at which the correlation of a signal is examined."""
 
@@ -55,7 +57,7 @@ def place_scales(
         texts = {key: value for key, value in place.holes.items() if isinstance(value, str)}
         found |= _magnitudes(model_set, base, placed_effect.place, texts)
         signals = _signals(model_set, base, placed_effect.place, texts)
-        found["time"] = correlation_time(signals, period) or horizon
+        found["time"] = max(correlation_time(signals, period) or horizon, MIN_TIME * period)
     return {
         name: round_scale(value)
         for name, value in found.items()

@@ -100,6 +100,7 @@ def _manoeuvre_series(
         inputs,
         measured,
         model_set.series[0].is_first_order_hold,
+        model_set.series[0].holds,
     )
 
 

@@ -64,7 +64,8 @@ def _fit_free_disturbance(
     name = placed_effect.qualified_name(DISTURBANCE_STATE) if placed_effect else None
     units = disturbance_units(candidate, model_set.series, base.values(0))
     levels = dict.fromkeys(units, ORDINARY_LEVEL) | ({name: INITIAL_LEVEL} if name else {})
-    noise_levels = with_disturbance_levels(base.noise_levels, units, levels)
+    whole_gains = dataclasses.replace(base.noise_levels, gain_scale=1.0)
+    noise_levels = with_disturbance_levels(whole_gains, units, levels)
     scans = []
     start = extend_vector(candidate, base.candidate, base.point, {})
     for point in (start, vector_of(candidate, len(model_set.series), {})):

@@ -38,6 +38,7 @@ COMPILATION_MODULES = (
     "parameter",
     "placed_effect",
     "sampled_recording",
+    "time_resolution",
 )
 """Modules of `diagnosis` on which a compiled candidate depends (part of the cache key)."""
 

@@ -32,7 +32,8 @@ class FreeParameter:
     """A parameter [SI] with a coordinate z: value = start exp(sd z) if `is_log`, else start + sd z.
 
     sd is `prior_std`. `low` and `high` are its range, `starts` the values from which fits begin.
-    With `per_recording` each recording has a value of its own.
+    With `per_recording` each recording has a value of its own. `is_order` marks a number of periods
+    over the path of an effect.
     """
 
     name: str
@@ -44,6 +45,7 @@ class FreeParameter:
     per_recording: bool = False
     starts: tuple[float, ...] = ()
     unit: str = "1"
+    is_order: bool = False
 
     def value(self, z: float) -> float:
         """Return the value [SI] at a coordinate; it may be outside the range."""
@@ -114,7 +116,7 @@ def _effect_parameter(parameter: Parameter) -> FreeParameter:
     unit = si_unit(parameter)
     if low > 0.0 and value > 0.0:
         sd = EFFECT_PRIOR_STD * math.log(high / low)
-        return FreeParameter(*place, sd, True, each, starts, unit)
+        return FreeParameter(*place, sd, True, each, starts, unit, fitting.form == "order")
     return FreeParameter(*place, EFFECT_PRIOR_STD * (high - low), False, each, starts, unit)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
-from diagnosis.criterion.explained_share import explained_share
+from diagnosis.criterion.explained_share import USUAL_FORM_ERROR, explained_share
 from diagnosis.criterion.threshold import Thresholds
 from diagnosis.equation.discovery import DiscoveredEquation, discover_equation
 from diagnosis.estimation.estimate import Estimate
@@ -42,7 +42,6 @@ class DiagnosisDecision:
     """The result of the selection; `model_set` has the recordings on which it is based."""
 
     model_set: ModelSet
-    base: Estimate
     selection: Selection
     locations: tuple[Location, ...]
     outcome: DecisionOutcome
@@ -54,23 +53,47 @@ def decide(case: Case, full_rate_set: ModelSet, log: LogCallback) -> DiagnosisDe
     """Return the decision on a case.
 
     Models predict each sample from those before it. A base that forgets its initial state is
-    simulated over whole recordings first; where no effect explains that, prediction decides.
+    simulated over whole recordings first. If effects explain that but for the error of their form,
+    they are the result. Else prediction is tried as well; if it names another effect, the one that
+    explains more decides.
     """
     model_set, base = fit_base(full_rate_set, log)
     locations = localise(model_set, base)
     log(format_location(locations, model_set))
+    simulated, share, known = None, 0.0, frozenset[str]()
     if has_fading_memory(base, model_set.series):
         log("the base forgets its initial state: whole recordings are simulated")
         found = fit_output_error(full_rate_set, base)
         selection = select_effects(found.model_set, found.base, case.thresholds, log)
-        if selection.accepted and _explains_simulations(selection):
-            model_set = dataclasses.replace(model_set, series=found.model_set.series)
-            outcome = _outcome_of(selection, model_set)
-            return DiagnosisDecision(
-                model_set, found.base, selection, locations, outcome, case.thresholds
-            )
-        log("no effect explains the simulations: each sample is predicted from those before it")
-    selection = select_effects(model_set, base, case.thresholds, log)
+        share = _simulated_share(selection)
+        known = frozenset(one.placed_effect.id for one in selection.accepted)
+        if share >= MIN_SIMULATED_SHARE:
+            series = dataclasses.replace(model_set, series=found.model_set.series)
+            outcome = _outcome_of(selection, series)
+            simulated = DiagnosisDecision(series, selection, locations, outcome, case.thresholds)
+        if simulated is not None and share >= 1.0 - USUAL_FORM_ERROR**2:
+            return simulated
+        log(f"effects explain {share:.0%} of the simulations: prediction is tried")
+    predicted = _decide_by_prediction(case, model_set, base, locations, known, log)
+    first = predicted.selection.accepted[:1]
+    is_other = bool(first) and first[0].placed_effect.id not in known
+    is_better = is_other and predicted.selection.share > share
+    return predicted if simulated is None or is_better else simulated
+
+
+def _decide_by_prediction(
+    case: Case,
+    model_set: ModelSet,
+    base: Estimate,
+    locations: tuple[Location, ...],
+    preferred: frozenset[str],
+    log: LogCallback,
+) -> DiagnosisDecision:
+    """Return the decision by models that predict each sample from those before it.
+
+    An effect in `preferred`, which explains simulations, is taken before others.
+    """
+    selection = select_effects(model_set, base, case.thresholds, log, preferred)
     selection, locations = detect_unknown_input(model_set, selection, locations, log)
     outcome, equation = _outcome_of(selection, model_set), None
     if outcome == "unknown":
@@ -79,18 +102,16 @@ def decide(case: Case, full_rate_set: ModelSet, log: LogCallback) -> DiagnosisDe
         )
         if equation is not None:
             selection = _select_equation(selection, equation)
-    return DiagnosisDecision(
-        model_set, base, selection, locations, outcome, case.thresholds, equation
-    )
+    return DiagnosisDecision(model_set, selection, locations, outcome, case.thresholds, equation)
 
 
-def _explains_simulations(selection: Selection) -> bool:
-    """Return whether the first effect explains `MIN_SIMULATED_SHARE` (half) of the error of whole
-    simulations above the noise of the signals.
+def _simulated_share(selection: Selection) -> float:
+    """Return the share of the error of whole simulations, above the noise of the signals, that the
+    accepted effects explain; 0 without any.
     """
-    first, noise = selection.accepted[0].estimate, selection.base.noise_levels.outputs**2
-    assert first is not None
-    return explained_share(first, selection.base, noise) >= MIN_SIMULATED_SHARE
+    noise = selection.base.noise_levels.outputs**2
+    is_any = bool(selection.accepted)
+    return explained_share(selection.model, selection.base, noise) if is_any else 0.0
 
 
 def _outcome_of(selection: Selection, model_set: ModelSet) -> DecisionOutcome:

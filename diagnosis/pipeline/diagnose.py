@@ -106,7 +106,7 @@ def diagnose(case: Case, log: LogCallback = lambda text: None) -> Diagnosis:
         locations = rank_causes_first(
             locations, [place_path(one.placed_effect) for one in candidates], model_set
         )
-    fit = {"train": compare_misfits(decision.base, selection.model, model_set.series)}
+    fit = {"train": compare_misfits(selection.base, selection.model, model_set.series)}
     verdict = _build_verdict(decision.outcome, selection, locations, automaton, fit)
     hashes = {case.name_of(path): _file_digest(path) for path in case.train}
     verdict = dataclasses.replace(

@@ -70,7 +70,7 @@ def search_candidates(
     is fitted fully if its screening gains `MIN_SCREENING_GAIN` (2 nats); beside accepted effects
     these are at most `MAX_FITS_BESIDE` (8). The others follow by descending screening gain.
     `flexible` is the vector of the base with a free disturbance, from which a poor fit is repeated.
-    Noise levels are those of the base.
+    Noise levels are those of the screening.
     """
     present = {one.id for one in base.candidate.placed_effects}
     new = [one for one in placed_effects if one.id not in present]
@@ -104,7 +104,7 @@ def _fit_fully(
     parameters and the flexible ones, with the effect's parameters of the screening. The fit of a
     deficient base may be far from the true parameters.
     """
-    candidate, series, noise_levels = screened.candidate, model_set.series, base.noise_levels
+    candidate, series, noise_levels = screened.candidate, model_set.series, screened.noise_levels
     jacobian = screened.jacobian or None
     first = refine(
         iterate(

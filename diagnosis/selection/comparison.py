@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -21,9 +22,12 @@ from diagnosis.criterion.explained_share import (
     least_share,
     least_variances,
     remaining_energy,
+    sampled_energy,
 )
+from diagnosis.criterion.threshold import DEFAULT_THRESHOLD
 from diagnosis.data.array_types import Reals
-from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.estimate import Estimate, with_best_gain_scale
+from diagnosis.estimation.levenberg_marquardt import estimate_parameters
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.localisation.disturbance_state_fit import free_disturbance
 from diagnosis.localisation.ranking import disturbance_locations
@@ -32,14 +36,18 @@ from diagnosis.model.placed_effect import PlacedEffect
 from diagnosis.selection.candidate_search import CandidateFit, search_candidates
 from diagnosis.selection.intersample import LogCallback
 
+MIN_BASE_GAIN = DEFAULT_THRESHOLD
+"""Gain [nats] for which the comparison is repeated with a better fit of the base."""
+
 
 @dataclass(frozen=True)
 class Round:
     """The candidates beside a base, the largest gain first, then those that were not fitted.
 
     `floor` (channels,) are the least mean-square innovations of all models of the round, `energy`
-    is what the base leaves above them. `free` are the fits of the base with a free disturbance, by
-    place; `correlation` is the number of samples that count as one.
+    is what the base leaves above them, and `sampled_energy` counts it for each independent sample.
+    `free` are the fits of the base with a free disturbance, by place; `correlation` is the number
+    of samples that count as one.
     """
 
     base: Estimate = field(repr=False)
@@ -48,6 +56,7 @@ class Round:
     floor: Reals = field(repr=False)
     energy: float
     correlation: float
+    sampled_energy: float
 
     @property
     def is_ordinary(self) -> bool:
@@ -65,14 +74,7 @@ class Round:
 
         If what the base leaves may be an ordinary disturbance, it is that without noise.
         """
-        return MIN_SHARE if self.is_ordinary else least_share(self.total_gain)
-
-    @property
-    def total_gain(self) -> float:
-        """The gain [nats] of the model of least cost over the base."""
-        fits = [one.estimate.cost for one in self.candidates if one.estimate is not None]
-        least = min([self.base.cost, *fits, *(one.cost for one in self.free.values())])
-        return (self.base.cost - least) / self.correlation
+        return MIN_SHARE if self.is_ordinary else least_share(self.sampled_energy)
 
 
 def compare_candidates(
@@ -84,10 +86,47 @@ def compare_candidates(
 ) -> Round:
     """Return the comparison of effects beside a base.
 
-    No candidate is fitted if the base leaves less than `least_energy` above its floor.
+    A candidate contains the base, so its fit can show that the fit of the base ended in a local
+    minimum. The base is then fitted again from the parameters of the best candidate, and compared
+    once more. No candidate is fitted if the base leaves less than `least_energy` above its floor.
     A base that is fitted by simulation has no free disturbance, so its effects are compared with
     each other. Whether it leaves `least_energy` is measured above the noise of the signals.
     """
+    effects = tuple(placed_effects)
+    compared = _compare(model_set, base, effects, log, least_energy)
+    better = _fit_base_again(model_set, compared)
+    if better is None:
+        return compared
+    log(f"the base is fitted again: {base.cost - better.cost:.0f} nats")
+    return _compare(model_set, better, effects, log, least_energy)
+
+
+def _fit_base_again(model_set: ModelSet, compared: Round) -> Estimate | None:
+    """Return the base fitted from the parameters of the best candidate or free disturbance.
+
+    It is None if that does not gain `MIN_BASE_GAIN` (20 nats).
+    """
+    base, series = compared.base, model_set.series
+    fits = [one.estimate for one in compared.candidates if one.estimate is not None]
+    best = min([base, *fits, *compared.free.values()], key=lambda one: one.cost)
+    if (base.cost - best.cost) / compared.correlation < MIN_BASE_GAIN:
+        return None
+    start = extend_vector(base.candidate, best.candidate, best.point, {})
+    fit = partial(estimate_parameters, base.candidate, series, base.noise_levels, start)
+    fitted = model_set.load_or_fit("base again", base.candidate, [start, base.noise_levels], fit)
+    again = with_best_gain_scale(fitted, series)
+    gain = (base.cost - again.cost) / compared.correlation
+    return again if gain >= MIN_BASE_GAIN else None
+
+
+def _compare(
+    model_set: ModelSet,
+    base: Estimate,
+    placed_effects: tuple[PlacedEffect, ...],
+    log: LogCallback,
+    least_energy: float,
+) -> Round:
+    """Return the comparison with the base as it is fitted."""
     is_simulated = base.noise_levels.is_output_error
     places = () if is_simulated else disturbance_locations(model_set, base)
     free = {
@@ -101,6 +140,17 @@ def compare_candidates(
     if remaining_energy(base, floor) < least_energy:
         placed_effects = ()
     found = search_candidates(model_set, base, placed_effects, start, log)
+    return judge(model_set, base, free, found)
+
+
+def judge(
+    model_set: ModelSet,
+    base: Estimate,
+    free: Mapping[str, Estimate],
+    found: Iterable[CandidateFit],
+) -> Round:
+    """Return the comparison of fitted candidates with a base and its free disturbances."""
+    found = list(found)
     fits = [one.estimate for one in found if one.estimate is not None]
     floor = least_variances([base, *free.values(), *fits])
     best = min([base, *fits], key=lambda one: one.cost)
@@ -118,7 +168,8 @@ def compare_candidates(
     ]
     judged.sort(key=lambda one: -one.gain)
     energy = remaining_energy(base, floor)
-    return Round(base, free, tuple(judged), floor, energy, correlation)
+    sampled = sampled_energy(base, floor, correlation)
+    return Round(base, free, tuple(judged), floor, energy, correlation, sampled)
 
 
 def effective_gain(model: Estimate, base: Estimate, correlation: float, recordings: int) -> float:

@@ -6,26 +6,29 @@ The base of the next comparison contains the accepted effects (docs/method.md).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
 from diagnosis.criterion.explained_share import (
-    FORM_ERROR,
     MAX_ORDINARY_ENERGY,
     MIN_SHARE,
+    USUAL_FORM_ERROR,
     explained_share,
     is_ordinary,
     log_form_weight,
     remaining_energy,
 )
 from diagnosis.criterion.threshold import DEFAULT_THRESHOLDS, Thresholds
-from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.estimate import Estimate, with_best_gain_scale
+from diagnosis.estimation.levenberg_marquardt import estimate_parameters
 from diagnosis.estimation.model_set import ModelSet
+from diagnosis.model.parameter_vector import extend_vector
 from diagnosis.model.placed_effect import effect_names
 from diagnosis.selection.candidate_search import CandidateFit
-from diagnosis.selection.comparison import Round, compare_candidates
+from diagnosis.selection.comparison import Round, compare_candidates, effective_gain, judge
 from diagnosis.selection.intersample import LogCallback
 from diagnosis.validation.free_simulation import complete_nrmse
 
@@ -67,13 +70,13 @@ def candidate_probabilities(compared: Round) -> dict[str, float]:
     They are the posterior masses of the explained shares under the model discrepancy
     (`log_form_weight`).
     """
-    noise = compared.total_gain
+    energy = compared.sampled_energy
     weights = {
-        one.placed_effect.id: log_form_weight(1.0 - one.share, noise, _own_count(one))
+        one.placed_effect.id: log_form_weight(1.0 - one.share, energy, _own_count(one))
         for one in compared.candidates
         if one.is_fitted
     }
-    weights["other"] = log_form_weight(None, noise)
+    weights["other"] = log_form_weight(None, energy)
     most = max(weights.values())
     masses = {name: math.exp(weight - most) for name, weight in weights.items()}
     whole = sum(masses.values())
@@ -92,27 +95,76 @@ def select_effects(
     base: Estimate,
     thresholds: Thresholds = DEFAULT_THRESHOLDS,
     log: LogCallback = lambda text: None,
+    preferred: Collection[str] = (),
 ) -> Selection:
     """Return the effects that the training recordings support, at most `MAX_EFFECTS` (3).
 
     The candidate with the largest gain is accepted if it gains its threshold and explains most of
     what any disturbance explains. If it explains less, a second effect is tried beside it: both are
-    accepted if they do so together.
+    accepted if they do so together. At last effects that the others make needless are dropped.
+    Of the effects that could be the first one, one whose identifier is in `preferred` is taken, and
+    its rivals are in `preferred` as well.
     """
     first = compare_candidates(model_set, base, model_set.applicable_effects(), log)
-    found = Selection(base, base, (), first, first)
-    best = _best_candidate(model_set, first, thresholds)
+    found = Selection(first.base, first.base, (), first, first)
+    best = _best_candidate(model_set, first, thresholds, preferred)
     if best is None:
         return found
     if best.share < first.least_share:
-        return _select_pair(model_set, found, best, thresholds, log)
-    found = _accept(model_set, found, best, log)
+        pair = _select_pair(model_set, found, best, thresholds, log)
+        if not pair.accepted:
+            return pair
+        found = pair
+    else:
+        found = _accept(model_set, found, best, log)
     while len(found.accepted) < MAX_EFFECTS:
         best = _best_candidate(model_set, found.last, thresholds)
         if best is None or best.share < found.last.least_share:
             break
         found = _accept(model_set, found, best, log)
-    return replace(found, rivals=_rivals(model_set, first, found.accepted[0]))
+    found = _drop_needless(model_set, found, thresholds, log)
+    rivals = _rivals(model_set, found.first, found.accepted[0])
+    if found.accepted[0].placed_effect.id in preferred:
+        rivals = tuple(one for one in rivals if one.placed_effect.id in preferred)
+    return replace(found, rivals=rivals)
+
+
+def _drop_needless(
+    model_set: ModelSet, found: Selection, thresholds: Thresholds, log: LogCallback
+) -> Selection:
+    """Return the selection without the effects that do not gain their threshold beside the others.
+
+    An effect that was accepted first may stand for others that were found later.
+    """
+    series = model_set.series
+    for one in found.accepted[:-1]:
+        others = [kept for kept in found.accepted if kept is not one]
+        candidate = model_set.compile_candidate([kept.placed_effect for kept in others])
+        start = extend_vector(candidate, found.model.candidate, found.model.point, {})
+        levels = found.model.noise_levels
+        fit = partial(estimate_parameters, candidate, series, levels, start)
+        fitted = model_set.load_or_fit("without one", candidate, [start, levels], fit)
+        without = with_best_gain_scale(fitted, series)
+        gain = effective_gain(found.model, without, found.last.correlation, len(series))
+        if gain < thresholds.threshold_of(one.placed_effect):
+            log(f"dropped {one.placed_effect.id}: {gain:.0f} nats beside the others")
+            found = _with_effects(model_set, found, others, without)
+    return found
+
+
+def _with_effects(
+    model_set: ModelSet, found: Selection, accepted: Sequence[CandidateFit], model: Estimate
+) -> Selection:
+    """Return the selection with other effects; one alone is compared again with its new fit."""
+    first = found.first
+    if len(accepted) == 1:
+        name = accepted[0].placed_effect.id
+        rest = [one for one in first.candidates if one.placed_effect.id != name]
+        single = replace(accepted[0], estimate=model)
+        first = judge(model_set, first.base, first.free, [*rest, single])
+        accepted = [one for one in first.candidates if one.placed_effect.id == name]
+    share = explained_share(model, first.base, first.floor)
+    return replace(found, model=model, accepted=tuple(accepted), first=first, share=share)
 
 
 def tolerated_energy(first: Round) -> float:
@@ -121,19 +173,23 @@ def tolerated_energy(first: Round) -> float:
     """
     levels = first.base.noise_levels
     if levels.is_output_error:
-        return FORM_ERROR**2 * remaining_energy(first.base, levels.outputs**2)
-    return min(FORM_ERROR**2 * first.energy, MAX_ORDINARY_ENERGY * len(first.floor))
+        return USUAL_FORM_ERROR**2 * remaining_energy(first.base, levels.outputs**2)
+    return min(USUAL_FORM_ERROR**2 * first.energy, MAX_ORDINARY_ENERGY * len(first.floor))
 
 
 def _best_candidate(
-    model_set: ModelSet, compared: Round, thresholds: Thresholds
+    model_set: ModelSet,
+    compared: Round,
+    thresholds: Thresholds,
+    preferred: Collection[str] = (),
 ) -> CandidateFit | None:
     """Return the candidate with the largest gain, None if it does not gain its threshold.
 
     There is none either if what the base leaves is negligible.
 
     Of the candidates that explain enough, it is the first one that also explains enough of what is
-    wrong in free simulations. Beside accepted effects there must be such a candidate.
+    wrong in free simulations, one in `preferred` before others. Beside accepted effects there must
+    be such a candidate.
     """
     if compared.is_negligible:
         return None
@@ -144,6 +200,7 @@ def _best_candidate(
     if not explaining:
         return next(iter(enough), None)
     simulating = _explain_simulations(model_set, compared, explaining)
+    simulating.sort(key=lambda one: one.placed_effect.id not in preferred)
     is_first = not compared.base.candidate.placed_effects
     return next(iter(simulating), explaining[0] if is_first else None)
 
@@ -187,14 +244,14 @@ def _accept(
 ) -> Selection:
     """Return the selection with one effect more, and the comparison beside it."""
     assert best.estimate is not None
-    log(f"accepted {best.placed_effect.id}: {best.gain:.0f} nats, {100 * best.share:.0f} %")
+    log(f"accepted {best.placed_effect.id}: {best.gain:.0f} nats, {best.share:.0%}")
     model = best.estimate
     last = compare_candidates(
         model_set, model, model_set.applicable_effects(), log, tolerated_energy(found.first)
     )
     accepted = (*found.accepted, best)
-    share = explained_share(model, found.base, found.first.floor)
-    return replace(found, model=model, accepted=accepted, last=last, share=share)
+    share = explained_share(last.base, found.base, found.first.floor)
+    return replace(found, model=last.base, accepted=accepted, last=last, share=share)
 
 
 def _select_pair(
@@ -209,7 +266,7 @@ def _select_pair(
     second = _best_candidate(model_set, pair.last, thresholds)
     if second is not None and second.share >= pair.last.least_share:
         return _accept(model_set, pair, second, log)
-    log(f"not accepted {best.placed_effect.id}: it explains {100 * best.share:.0f} %")
+    log(f"not accepted {best.placed_effect.id}: it explains {best.share:.0%}")
     return found
 
 

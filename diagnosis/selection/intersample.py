@@ -12,11 +12,11 @@ from functools import partial
 
 import numpy as np
 
-from diagnosis.data.sampled_recording import SampledRecording, resample
+from diagnosis.data.sampled_recording import SampledRecording, open_holds, resample
 from diagnosis.estimation.estimate import Estimate, with_best_gain_scale
 from diagnosis.estimation.initial_input import average_initial_inputs, choose_initial_inputs
 from diagnosis.estimation.innovations import measured_noise_levels
-from diagnosis.estimation.levenberg_marquardt import estimate_parameters
+from diagnosis.estimation.levenberg_marquardt import estimate_parameters, refine
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.estimation.noise_level import HUBER_STDS, ORDINARY_LEVEL, disturbance_units
 from diagnosis.estimation.place_scale import with_scales
@@ -31,21 +31,30 @@ def fit_base(model_set: ModelSet, log: LogCallback = lambda text: None) -> Fitte
     """Return the model set with decimated recordings and the base fitted to them.
 
     The noise of the signals is the measured one, and each balance has an ordinary disturbance of
-    `ORDINARY_LEVEL` (0.1 units); these levels are held. Inputs are linear or constant between
-    samples, whichever costs less with the best free disturbance of a balance. Huber limits are
-    `HUBER_STDS` (4) robust standard deviations of the innovations of a first fit without limits.
-    Raises ValueError if the model cannot be linearised.
+    `ORDINARY_LEVEL` (0.1 units); these levels are held. Inputs without a known hold are linear or
+    constant between samples, whichever costs less with the best free disturbance of a balance.
+    Huber limits are `HUBER_STDS` (4) robust standard deviations of the innovations of a first fit
+    without limits. Raises ValueError if the model cannot be linearised.
     """
-    by_hold = [_fit_with_hold(model_set, is_linear) for is_linear in (True, False)]
+    by_hold = [_fit_with_hold(model_set, is_linear) for is_linear in open_holds(model_set.series)]
     paced, first = min(by_hold, key=_flexible_cost)
     limits = HUBER_STDS * np.maximum(first.prediction.robust_std(), 1e-12)
     noise_levels = dataclasses.replace(first.noise_levels, huber_limits=limits)
     fit = partial(estimate_parameters, first.candidate, paced.series, noise_levels, first.point)
     fitted = paced.load_or_fit("base", first.candidate, [first.point, noise_levels], fit)
     base = with_best_gain_scale(fitted, paced.series)
-    text = "linear between samples" if paced.series[0].is_first_order_hold else "held"
-    log(f"base fitted, inputs {text}: {base.cost:.0f} nats")
+    if base.noise_levels.gain_scale < 1.0:
+        again = partial(refine, base, paced.series)
+        base = paced.load_or_fit("scaled base", base.candidate, [base.point, base.gains], again)
+    log(f"base fitted, {_describe_holds(paced)}: {base.cost:.0f} nats")
     return with_scales(paced, base), base
+
+
+def _describe_holds(model_set: ModelSet) -> str:
+    """Return which inputs are linear between samples, in words."""
+    linear = np.any([one.linear_inputs for one in model_set.series], axis=0)
+    names = [name for name, one in zip(model_set.automaton.inputs, linear, strict=True) if one]
+    return f"linear between samples: {', '.join(names)}" if names else "inputs held"
 
 
 def _fit_with_hold(model_set: ModelSet, is_linear: bool) -> FittedBase:

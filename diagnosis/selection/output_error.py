@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.data.sampled_recording import SampledRecording, resample
+from diagnosis.data.sampled_recording import SampledRecording, open_holds, resample
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.levenberg_marquardt import estimate_parameters
 from diagnosis.estimation.model_set import ModelSet
@@ -46,7 +46,7 @@ def _remaining_shift(model: Estimate, series: SampledRecording, recording: int) 
     page = candidate.calibration_page(model.values(recording), series)
     steady = np.zeros((len(predictor.modes), len(predictor.states), len(predictor.outputs)))
     blank = np.full_like(series.measured, np.nan)
-    how = candidate.compiled.substeps, series.is_first_order_hold
+    how = candidate.compiled.substeps, series.linear_inputs
     plain = predictor.predict(page, series.inputs, blank, steady[:0], steady, *how)
     once = blank.copy()
     once[0, 0] = plain.outputs[0, 0] + 1.0
@@ -71,10 +71,10 @@ def fit_output_error(full_rate_set: ModelSet, base: Estimate) -> OutputErrorFit:
     """
     limits = np.full_like(base.noise_levels.huber_limits, np.inf)
     noise_levels = dataclasses.replace(
-        base.noise_levels, process={}, huber_limits=limits, is_output_error=True
+        base.noise_levels, process={}, huber_limits=limits, is_output_error=True, gain_scale=1.0
     )
     found = []
-    for is_linear in (True, False):
+    for is_linear in open_holds(full_rate_set.series):
         series = resample(
             full_rate_set.series, full_rate_set.automaton, full_rate_set.output_names, is_linear
         )

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from functools import partial
 
-from diagnosis.estimation.estimate import Estimate, evaluate, evaluate_near
-from diagnosis.estimation.innovations import PredictionResult
+from diagnosis.estimation.estimate import Estimate, evaluate_near, with_best_gain_scale
 from diagnosis.estimation.levenberg_marquardt import (
     SCREENING_ITERATIONS,
     iterate_with_jacobian,
     refresh_gains,
 )
 from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.path_spectrum import strongest_orders
 from diagnosis.estimation.per_recording_parameters import restart_phases
 from diagnosis.model.candidate import Candidate
 from diagnosis.model.parameter_vector import extend_vector
@@ -27,8 +28,10 @@ def screen_candidate(model_set: ModelSet, base: Estimate, candidate: Candidate) 
     """Return a candidate after a few steps from the best of its starts.
 
     The parameters of the base start at their values there, and their Jacobian columns are those of
-    the base; the noise levels are those of the base. Phases are set to their best start before and
-    after the steps. The result is stored in the fit cache. The cost is infinite if the candidate
+    the base; the noise levels are those of the base, but a base that lacks physics may need larger
+    Kalman gains than the candidate. Phases are set to their best start before and
+    after the steps. The Kalman gains do not know of a delay, so with one their factor is chosen at
+    each start. The result is stored in the fit cache. The cost is infinite if the candidate
     diverges at every start.
     """
     fit = partial(_screen, model_set, base, candidate)
@@ -38,17 +41,15 @@ def screen_candidate(model_set: ModelSet, base: Estimate, candidate: Candidate) 
 
 def _screen(model_set: ModelSet, base: Estimate, candidate: Candidate) -> Estimate:
     """Return the screening of a candidate without the fit cache."""
-    series = model_set.series
-    starts: list[Estimate] = []
-    near: PredictionResult | None = None
-    for values in start_values(candidate, base.values(0)):
+    series, levels = model_set.series, base.noise_levels
+    levels = dataclasses.replace(levels, gain_scale=min(levels.gain_scale, 1.0))
+    starts = []
+    given = start_values(candidate, base.values(0))
+    for values in _with_orders(model_set, base, candidate, given):
         point = extend_vector(candidate, base.candidate, base.point, values)
-        here = (
-            evaluate_near(candidate, series, base.noise_levels, point, base)
-            if near is None
-            else evaluate(candidate, series, base.noise_levels, point, near)
-        )
-        near = here.prediction if here.prediction.is_complete else near
+        here = evaluate_near(candidate, series, levels, point, base)
+        if candidate.compiled.delays:
+            here = with_best_gain_scale(here, series)
         starts.append(restart_phases(here, series))
     starts.sort(key=lambda one: one.cost)
     halved = [
@@ -63,6 +64,34 @@ def _screen(model_set: ModelSet, base: Estimate, candidate: Candidate) -> Estima
         return best
     again = iterate_with_jacobian(again, series, base.jacobian, SCREENING_ITERATIONS)
     return refresh_gains(again, series)
+
+
+def _with_orders(
+    model_set: ModelSet, base: Estimate, candidate: Candidate, starts: list[dict[str, float]]
+) -> list[dict[str, float]]:
+    """Return starts in which an order is that of a strong period of the innovations of the base.
+
+    The path is the first state that the candidate adds. Without an order, or if the path does not
+    move, the starts are returned.
+    """
+    orders = [one for one in candidate.free_parameters if one.is_order and one.name in starts[0]]
+    paths = [
+        name for name in candidate.predictor.states if name not in base.candidate.predictor.states
+    ]
+    if not orders or not paths:
+        return starts
+    point = extend_vector(candidate, base.candidate, base.point, starts[0])
+    here = evaluate_near(candidate, model_set.series, base.noise_levels, point, base)
+    if not here.prediction.is_complete:
+        return starts
+    column = candidate.predictor.states.index(paths[0])
+    found = strongest_orders(
+        [run.states[:, column] for run in here.prediction.predictions],
+        [run.innovations for run in base.prediction.predictions],
+        orders[0].low,
+        orders[0].high,
+    )
+    return [{**starts[0], orders[0].name: order} for order in found] or starts
 
 
 def start_values(candidate: Candidate, base: Mapping[str, float]) -> list[dict[str, float]]:

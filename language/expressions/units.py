@@ -110,6 +110,7 @@ PURE_NUMBER = Dimension()
 UNKNOWN_DIMENSION = Dimension((), None)
 """Dimension of an erroneous unit: compatible with everything, so no further problem follows."""
 SECOND = Dimension((0, 0, 1, 0, 0))
+RADIAN = Dimension((0, 0, 0, 0, 0), 1)
 NO_UNIT = Unit("1", Fraction(1), PURE_NUMBER)
 UNKNOWN_UNIT = Unit("?", Fraction(1), UNKNOWN_DIMENSION)
 

@@ -160,7 +160,7 @@ class _MapReader(Reader):
         if (to is None) == (compare is None):
             label = "a column has `to` (an input) or `compare` (an output)"
             self.problems.error("missing", entry.span, label)
-        hold = self.read_choice(table.get("hold"), "hold", ("previous", "linear"), "previous")
+        hold = self.read_choice(table.get("hold"), "hold", ("previous", "linear"), "")
         blank = self.read_choice(table.get("blank"), "blank", ("refuse", "skip"), "refuse")
         delay = table.get("delay")
         shift, unit = (
@@ -183,7 +183,7 @@ class _MapReader(Reader):
             blank=cast(Literal["refuse", "skip"], blank),
             time=self.read_string(time, "time", entry.span) if time else None,
             span=entry.span,
-            hold=cast(Literal["previous", "linear"], hold),
+            hold=cast(Literal["previous", "linear"], hold) if hold else None,
         )
 
     def _read_scale(self, table: MappingNode) -> tuple[Fraction, Dimension]:

@@ -47,13 +47,15 @@ class Fitting:
 
     `neutral` is the value at which the effect of the parameter vanishes, or `absent` if there is no
     such value. `plain` is the value at which the effect reduces to a simpler one. `starts` are
-    start values of the fit. With `per: recording` each recording has a value of its own.
+    start values of the fit. With `per: recording` each recording has a value of its own. With
+    `form: order` a fit starts from the strongest periods over the path that is the first state of
+    the effect.
     """
 
     neutral: Fraction | Literal["absent"] | None = None
     starts: tuple[Fraction, ...] = ()
     per: Literal["model", "recording"] = "model"
-    form: Literal["constant", "constant_or_random_walk"] = "constant"
+    form: Literal["constant", "constant_or_random_walk", "order"] = "constant"
     plain: Fraction | None = None
 
 

@@ -214,7 +214,8 @@ class ColumnMapping:
     """The use of one or several columns of a recording as a signal.
 
     Of several `columns` the mean is used. The signal is the input `to`, or it is compared with the
-    output `compare`. `delay` is in s. `time` names a time column of its own.
+    output `compare`. `delay` is in s. `time` names a time column of its own. Without `hold` a value
+    is kept until the next one; a diagnosis may then choose (`diagnosis.selection.intersample`).
     """
 
     name: str
@@ -228,7 +229,7 @@ class ColumnMapping:
     blank: Literal["refuse", "skip"]
     time: str | None
     span: Span
-    hold: Literal["previous", "linear"] = "previous"
+    hold: Literal["previous", "linear"] | None = None
 
 
 Window = tuple[Fraction, Fraction]

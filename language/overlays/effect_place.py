@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from language.expressions.text_rewrite import split_balance
-from language.expressions.units import SECOND, Dimension, are_compatible
+from language.expressions.units import RADIAN, SECOND, Dimension, are_compatible
 from language.overlays.effect_reader import ELEMENT_PARTS, Effect, PlacePattern
 from language.overlays.name_types import TreeTypes, format_si_unit, formula_entries
 from language.readers.element_reader import outputs_as_mapping
 from language.text.diagnostic import suggest_name
 from language.text.document import MappingNode, ScalarNode
-from language.text.node_edit import scalars_of
+from language.text.node_edit import mapping_entries, scalars_of
 
 Hole = str | tuple[str, ...]
 """The text that fills a hole, or several texts."""
@@ -50,7 +50,7 @@ def find_effect_place(tree: MappingNode, effect: Effect, name: str) -> EffectPla
     for pattern in effect.place_patterns:
         place = PLACE_FINDERS[pattern.kind](tree, known, pattern, name)
         if isinstance(place, EffectPlace):
-            lacking = [key for key in pattern.has if key not in place.holes]
+            lacking = [key for key in pattern.has if not place.holes.get(key)]
             if not lacking:
                 return place
             place = _missing_hole(pattern, name, lacking[0])
@@ -101,7 +101,7 @@ def _find_balance(
         factors = {_balance_coefficient(scalar.text, name) for scalar in scalars}
         if len(factors) == 1:
             holes["inertia"] = factors.pop()
-    return EffectPlace(name, {**holes, **_declared_holes(tree, name)}, name)
+    return EffectPlace(name, {**holes, **_declared_holes(tree, known, name)}, name)
 
 
 def _find_input(
@@ -147,7 +147,7 @@ def _signal_place(
         "unit": format_si_unit(kind),
         "unit_rate": format_si_unit(_multiply_dimensions(kind, SECOND, -1)),
     }
-    return EffectPlace(name, {hole: read_name, **units, **_declared_holes(tree, name)})
+    return EffectPlace(name, {hole: read_name, **units, **_declared_holes(tree, known, name)})
 
 
 def _find_element(
@@ -172,7 +172,7 @@ def _find_element(
             dimension = known.type_of_formula(node)
             if isinstance(dimension, Dimension):
                 kinds[part] = dimension
-    if "far" in element.entries:
+    if "far" in element.entries or pattern.of == "inertia":
         holes["far"] = tuple(item.text for item in scalars_of(element.get("far")))
     measured = "torque" if pattern.of == "elastic" else "inertia"
     unit = kinds.get(measured)
@@ -205,6 +205,8 @@ def _element_units(of: str, kinds: Mapping[str, Dimension]) -> dict[str, Hole]:
         units.setdefault(
             "damping", _multiply_dimensions(_multiply_dimensions(force, angle, -1), SECOND)
         )
+    if "angle_rate" in kinds:
+        holes.update(_path_units(kinds["angle_rate"]))
     for part, dimension in units.items():
         holes[part if part in ("angle", "force") else f"{part}_unit"] = format_si_unit(dimension)
     unit = units.get("force" if of == "elastic" else "speed")
@@ -229,12 +231,26 @@ def _gap_holes(tree: MappingNode, holes: Mapping[str, Hole]) -> dict[str, Hole]:
     return gap_holes
 
 
-def _declared_holes(tree: MappingNode, name: str) -> dict[str, Hole]:
-    """Return the keys that `places` declares for a balance, input or output, with their texts."""
+def _declared_holes(tree: MappingNode, known: TreeTypes, name: str) -> dict[str, Hole]:
+    """Return the keys that `places` declares for a balance, input or output, with their texts and
+    the units of a path.
+    """
     places = tree.get("places")
     table = places.get(name) if isinstance(places, MappingNode) else None
-    entries = table if isinstance(table, MappingNode) else ()
-    return {entry.key: entry.node.text for entry in entries if isinstance(entry.node, ScalarNode)}
+    texts = {
+        one.key: one.node for one in mapping_entries(table) if isinstance(one.node, ScalarNode)
+    }
+    speed = known.type_of_formula(texts["angle_rate"]) if "angle_rate" in texts else None
+    units = _path_units(speed) if isinstance(speed, Dimension) else {}
+    return {**{key: node.text for key, node in texts.items()}, **units}
+
+
+def _path_units(speed: Dimension) -> dict[str, Hole]:
+    """Return the units of a speed, of what it travels (`path`), of an angle over it (`order`)."""
+    path = _multiply_dimensions(speed, SECOND)
+    order = _multiply_dimensions(RADIAN, path, -1)
+    dimensions = {"angle_rate_unit": speed, "path": path, "order": order}
+    return {name: format_si_unit(one) for name, one in dimensions.items()}
 
 
 def _balance_coefficient(balance: str, state: str) -> str:

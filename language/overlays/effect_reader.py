@@ -60,12 +60,17 @@ ELEMENT_PARTS = (
     *("speed", "inertia"),
 )
 """Keys of an element that become holes."""
+PATH_HOLES = ("angle_rate_unit", "path", "order")
+"""Units of the speed `angle_rate`, of what it travels, and of an angle over that."""
 HOLES_BY_PLACE_KIND = {
-    "balance": ("x", "unit", "force", "inertia", "inertia_unit", "damping_unit", "drag_unit"),
-    "input": ("u", "unit", "unit_rate"),
-    "output": ("y", "unit", "unit_rate"),
+    "balance": (
+        *("x", "unit", "force", "inertia", "inertia_unit", "damping_unit", "drag_unit"),
+        *PATH_HOLES,
+    ),
+    "input": ("u", "unit", "unit_rate", *PATH_HOLES),
+    "output": ("y", "unit", "unit_rate", *PATH_HOLES),
     "element": (
-        *("unit", "force", "angle", "far", "stretch", "gap_rate", *ELEMENT_PARTS),
+        *("path", "order", "unit", "force", "angle", "far", "stretch", "gap_rate", *ELEMENT_PARTS),
         *(f"{part}_unit" for part in ELEMENT_PARTS),
     ),
 }

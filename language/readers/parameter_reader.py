@@ -13,9 +13,9 @@ from language.text.diagnostic import Problems
 from language.text.document import Entry, MappingNode, ScalarNode, YamlNode
 
 FITTING_KEYS = ("neutral", "plain", "starts", "per", "form", "scale")
-FIT_FORMS = ("constant", "constant_or_random_walk")
+FIT_FORMS = ("constant", "constant_or_random_walk", "order")
 FitScope = Literal["model", "recording"]
-FitForm = Literal["constant", "constant_or_random_walk"]
+FitForm = Literal["constant", "constant_or_random_walk", "order"]
 
 
 class ParameterReader(Reader):

@@ -85,7 +85,7 @@ def make_dossier(project: Project, layers: Sequence[PlacedEffect]) -> DiagnosisR
     point = ParameterVector(z, np.tile(z, (2, 1)))
     model = Estimate(candidate, point, 0.0, NOTHING, NOTHING, NOTHING, normal)
     tried = tuple(CandidateFit(layer, 100.0, model, 90.0, 0.9) for layer in layers)
-    compared = Round(model, {}, tried, np.ones(1), 1.0, 1.0)
+    compared = Round(model, {}, tried, np.ones(1), 1.0, 1.0, 200.0)
     selection = Selection(model, model, tried, compared, compared)
     plain = automaton_with_effects(base, project, ())
     effects = tuple(named_effect_of(layer, model, plain) for layer in layers)

@@ -46,7 +46,13 @@ def test_without_a_gain_it_moves_as_the_interpreter(number: str) -> None:
     page = np.array(list(columns.page.values()))
     with build_predictor(made, columns) as library:
         run = Predictor(columns, library).predict(
-            page, inputs, np.zeros((200, 1)), no_gain[:0], no_gain, 1, is_first_order_hold=False
+            page,
+            inputs,
+            np.zeros((200, 1)),
+            no_gain[:0],
+            no_gain,
+            1,
+            linear_inputs=np.zeros(inputs.shape[1], dtype=np.int64),
         )
     theirs = Interpreter(made)
     found = []

@@ -9,10 +9,12 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
+from scipy.integrate import quad
 
 from diagnosis.criterion.explained_share import (
     FORM_ERROR,
     FORM_SAMPLES,
+    LEAST_FORM_ERROR,
     MAX_ORDINARY_ENERGY,
     MIN_SHARE,
     explained_share,
@@ -24,7 +26,7 @@ from diagnosis.criterion.explained_share import (
 from diagnosis.estimation.estimate import Estimate
 
 LARGE = 1e9
-"""A gain [nats] beside which noise does not count."""
+"""An energy beside which noise does not count."""
 gains = st.floats(0.0, 1e6)
 parts = st.floats(0.0, 4.0)
 variances = st.lists(st.floats(1e-6, 1e6), min_size=2, max_size=2)
@@ -85,9 +87,17 @@ def test_shares_do_not_depend_on_units_and_are_at_most_1(
 
 
 def test_the_least_share_follows_from_the_error_of_the_form() -> None:
-    square = FORM_ERROR**2
-    assert pytest.approx(1.0 - square * (1.0 - math.log(square))) == MIN_SHARE
-    assert pytest.approx(0.69, abs=0.01) == MIN_SHARE
+    """The mass of an effect, integrated over the logarithm of the error."""
+    low, high = math.log(LEAST_FORM_ERROR), math.log(FORM_ERROR)
+
+    def density(log_error: float) -> float:
+        variance = math.exp(2.0 * log_error)
+        misfit = 2.0 * log_error + (1.0 - MIN_SHARE) / variance
+        return math.exp(-FORM_SAMPLES / 2.0 * misfit) / (high - low)
+
+    mass, _ = quad(density, low, high)
+    assert mass == pytest.approx(math.exp(-FORM_SAMPLES / 2.0), rel=0.03)
+    assert pytest.approx(0.70, abs=0.01) == MIN_SHARE
 
 
 def test_an_effect_that_leaves_nothing_is_more_probable_than_an_unknown_disturbance() -> None:
@@ -128,7 +138,9 @@ def test_a_larger_gain_separates_more(first: float, second: float) -> None:
         return log_form_weight(0.0, gain) - log_form_weight(1.0, gain)
 
     assert 0.0 < distance(low) <= distance(high) + 1e-9
-    assert distance(high) <= FORM_SAMPLES / (2.0 * FORM_ERROR**2) + 1e-9
+    ratio = math.log(FORM_ERROR / LEAST_FORM_ERROR)
+    most = FORM_SAMPLES * (ratio + 0.5 / FORM_ERROR**2) + 5.0
+    assert distance(high) <= most
 
 
 @given(st.floats(-4.0, 0.0), gains)

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from diagnosis.data.sampled_recording import has_feedthrough
+from diagnosis.data.sampled_recording import (
+    SampledRecording,
+    decimate,
+    has_feedthrough,
+    interpolate,
+    open_holds,
+)
 from diagnosis.model.candidate import compile_candidate
 from diagnosis.pipeline.diagnosis_case import Case, read_series
 from engine.recordings.recording_window import paths_overlap
@@ -92,9 +99,49 @@ def test_what_is_shown_follows_from_the_input_of_its_own_sample() -> None:
     blank, substeps = np.full((50, 1), np.nan), one.compiled.substeps
     page = np.array(list(one.predictor.page.values()))
     found = one.predictor.predict(
-        page, ramp, blank, nothing[:0], nothing, substeps, is_first_order_hold=True
+        page, ramp, blank, nothing[:0], nothing, substeps, linear_inputs=np.array([1])
     )
     q, v, _ = found.states.T
     force = 35.1507 * (160.18 * 243.45 * (ramp[:, 0] - q) - 243.45 * v)
     assert found.outputs[:, 0] == pytest.approx(force, rel=1e-12)
     assert np.all(np.abs(force[10:]) > 100.0)
+
+
+def with_holds(*inputs: list[float]) -> SampledRecording:
+    """A held input, a linear one and one whose hold is open."""
+    columns = np.array(inputs).T
+    holds = ("previous", "linear", None)
+    return SampledRecording(
+        "a", Fraction(1, 100), Fraction(0), columns, np.zeros((len(columns), 1)), holds=holds
+    )
+
+
+def test_each_input_is_averaged_and_interpolated_by_its_own_hold() -> None:
+    ramp = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]
+    one = with_holds(ramp, ramp, ramp)
+    thin = decimate(one, longest=Fraction(3, 100))
+    assert thin.inputs[1].tolist() == [4.0, 3.0, 4.0]
+    assert thin.linear_inputs.tolist() == [0, 1, 0]
+    thin = decimate(one, is_first_order_hold=True, longest=Fraction(3, 100))
+    assert thin.inputs[1].tolist() == [4.0, 3.0, 3.0]
+    assert thin.linear_inputs.tolist() == [0, 1, 1]
+    slower = interpolate(one, Fraction(15, 1000))
+    assert slower.inputs[1].tolist() == [1.0, 1.5, 1.5]
+    assert open_holds((one,)) == (True, False)
+
+
+def test_the_map_says_the_hold_and_an_input_with_two_values_is_held(tmp_path: Path) -> None:
+    file = tmp_path / "run.csv"
+    rows = [f"{k / 100},{k % 2},{k * k},{k}" for k in range(60)]
+    file.write_text("\n".join(["t,a,b,c", *rows]))
+    case, automaton = case_of("blind_driveline")
+    inputs = "a: {to: T_em, unit: N*m%s}, b: {to: T_br, unit: N*m%s}"
+    head = "language: 1\nmap: columns\ntime: {column: t, unit: s}\ncolumns: "
+    found = []
+    for holds in (("", ""), (", hold: linear", ", hold: previous")):
+        path = tmp_path / "columns.yaml"
+        path.write_text(f"{head}{{{inputs % holds}, c: {{compare: w_em, unit: rad/s}}}}\n")
+        mapping = read_map(read_document(path), PROJECT)
+        (one,) = read_series(file, dataclasses.replace(case, mapping=mapping), automaton, ("w_em",))
+        found.append(one.holds)
+    assert found == [("previous", None), ("linear", "previous")]

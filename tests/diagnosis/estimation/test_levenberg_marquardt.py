@@ -72,7 +72,13 @@ def simulate_recordings(
         page = candidate.calibration_page(values, blank)
         substeps = candidate.compiled.substeps
         run = candidate.predictor.predict(
-            page, inputs, measured, no_gain[:0], no_gain, substeps, is_first_order_hold=False
+            page,
+            inputs,
+            measured,
+            no_gain[:0],
+            no_gain,
+            substeps,
+            linear_inputs=blank.linear_inputs,
         )
         assert run.completed == COUNT
         noisy = run.outputs + rng.normal(0.0, [0.05, 0.01], run.outputs.shape)

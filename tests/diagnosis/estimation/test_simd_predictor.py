@@ -29,7 +29,8 @@ pytestmark = pytest.mark.long
 Reals = NDArray[np.float64]
 COUNTS = (150, 90, 211, 40, 171)
 """Samples of recordings: one vector and one that is left over."""
-LINEAR = (1, 0, 1, 1, 0)
+LINEAR = ((1, 1), (0, 0), (1, 0), (0, 1), (0, 0))
+"""Inputs that are linear between samples, by recording."""
 POINTS = 3
 UNKNOWN = 0.2
 """Part of the measurements that are not known."""
@@ -106,7 +107,7 @@ def alone(
     low, high = given.starts[r : r + 2]
     inputs, measured = given.inputs[low:high], given.measured[low:high]
     return predictor.predict(
-        page, inputs, measured, *gains, n, is_first_order_hold=bool(given.is_first_order_hold[r])
+        page, inputs, measured, *gains, n, linear_inputs=given.linear_inputs[r]
     )
 
 

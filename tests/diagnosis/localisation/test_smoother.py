@@ -86,7 +86,7 @@ def test_a_drift_lies_within_its_standard_deviations_as_often_as_it_should(bench
             nothing[:0],
             nothing,
             candidate.compiled.substeps,
-            is_first_order_hold=False,
+            linear_inputs=blank.linear_inputs,
             state_increments=pushes,
         )
         measured = run.outputs + rng.normal(0.0, [0.05, 0.01], run.outputs.shape)

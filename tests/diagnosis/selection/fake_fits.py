@@ -95,4 +95,4 @@ def round_of(
 ) -> Round:
     """A comparison beside a base; a free disturbance gains `total`."""
     free = {"flow.w": fit_of((), base.cost - total)}
-    return Round(base, free, tuple(candidates), np.ones(1), energy, 1.0)
+    return Round(base, free, tuple(candidates), np.ones(1), energy, 1.0, 1e6)

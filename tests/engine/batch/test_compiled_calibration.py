@@ -143,7 +143,13 @@ def test_a_predictor_reads_the_tables_that_its_page_does_not_hold(
     with build_predictor(program, columns) as library:
         page = np.array(list(columns.page.values()))
         run = Predictor(columns, library).predict(
-            page, inputs, np.zeros((5, 1)), no_gain[:0], no_gain, 1, is_first_order_hold=False
+            page,
+            inputs,
+            np.zeros((5, 1)),
+            no_gain[:0],
+            no_gain,
+            1,
+            linear_inputs=np.zeros(inputs.shape[1], dtype=np.int64),
         )
     theirs, found = Interpreter(program), []
     for row in inputs:

@@ -183,10 +183,16 @@ def test_a_part_that_is_nowhere_is_refused(tmp_path: Path) -> None:
 
 def test_an_element_without_what_an_effect_needs_is_told_the_key(tmp_path: Path) -> None:
     project = cart(tmp_path, "{split@body: {}}")
-    project_of(tmp_path, cart=CART.replace(", far: [load]", ""))
+    project_of(tmp_path, cart=CART.replace("inertia: m,", ""))
     assert problem_lines(
         lambda: expand_document(read_document(project.path_of("laid")), project)
-    ) == ["4:17 `split` cannot be applied here: element `body` has no `far`"]
+    ) == ["4:17 `split` cannot be applied here: element `body` has no `inertia`"]
+
+
+def test_of_an_inertia_without_a_far_side_nothing_moves(tmp_path: Path) -> None:
+    project = cart(tmp_path, "{split@body: {}}")
+    project_of(tmp_path, cart=CART.replace(", far: [load]", ""))
+    assert text(project, "flow.v") == "m_1_body * der(v) = F - load - (F_s + F) + F * v / v"
 
 
 def test_an_expression_is_no_name_to_redirect(tmp_path: Path) -> None:

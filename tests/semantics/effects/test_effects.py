@@ -249,6 +249,7 @@ NEUTRAL = [
     ("sensor_offset@w_w", "offset: 0 rad/s"),
     ("sensor_eccentricity@w_w", "ecc: 0"),
     ("unknown_input@w_w", ""),
+    ("added_inertia@w_em", "ratio: 0"),
 ]
 
 

@@ -48,7 +48,8 @@ WRITTEN_OUT: dict[str, str] = {
 }
 """Parameters of the library's effects that are written out: one more would be one more form."""
 OTHERS = {
-    "backlash", "quadratic_drag", "road_grade", "sensor_offset", "sensor_quantisation",
+    "added_inertia", "backlash", "quadratic_drag", "road_grade", "sensor_offset",
+    "sensor_quantisation",
     "sensor_scale", "torque_gain", "torque_offset", "unknown_input", "viscous_friction",
 }  # fmt: skip
 """Effects of the library that have one form or that the generator does not know."""

@@ -21,7 +21,7 @@ def record_decision(found: Diagnosis) -> dict[str, Any]:
     return {
         "energy": float(first.energy),
         "channels": len(first.floor),
-        "total_gain": float(first.total_gain),
+        "sampled_energy": float(first.sampled_energy),
         "correlation": float(first.correlation),
         "candidates": [_candidate(one, automaton) for one in first.candidates if one.is_fitted],
         "accepted": [_name(one, automaton) for one in found.selection.accepted],

@@ -47,23 +47,13 @@ def use_constants(constants: Constants) -> Iterator[None]:
         yield
 
 
-def least_share() -> float:
-    """Return the explained share from which an effect outweighs an unknown disturbance.
-
-    Without noise and parameters, the logarithmic weight is linear in the remaining share.
-    """
-    unknown = explained_share.log_form_weight(None, math.inf)
-    full, none = (explained_share.log_form_weight(left, math.inf) for left in (1.0, 0.0))
-    return 1.0 - (none - unknown) / (none - full)
-
-
 def verdict_probabilities(decision: Mapping[str, Any]) -> dict[str, float]:
     """Return the probabilities of names, of `other` and of `nothing_missing` for stored numbers.
 
     If no candidate gains and explains enough and the energy is ordinary, nothing is missing with
     certainty; else the masses of the comparison count.
     """
-    least, candidates = least_share(), decision["candidates"]
+    least, candidates = explained_share.least_share(), decision["candidates"]
     is_named = any(
         (one["gain"] or 0.0) >= DEFAULT_THRESHOLD and (one["share"] or 0.0) >= least
         for one in candidates
@@ -71,12 +61,12 @@ def verdict_probabilities(decision: Mapping[str, Any]) -> dict[str, float]:
     energy = math.inf if decision["energy"] is None else decision["energy"]
     if not is_named and explained_share.is_ordinary(energy, decision["channels"]):
         return {NOTHING: 1.0}
-    gain = decision["total_gain"] or 0.0
+    sampled = decision["sampled_energy"] or 0.0
     names = [OTHER, *(one["id"] for one in candidates)]
     weights = [
-        explained_share.log_form_weight(None, gain),
+        explained_share.log_form_weight(None, sampled),
         *(
-            explained_share.log_form_weight(1.0 - (one["share"] or 0.0), gain, one["parameters"])
+            explained_share.log_form_weight(1.0 - (one["share"] or 0.0), sampled, one["parameters"])
             for one in candidates
         ),
     ]

@@ -25,7 +25,7 @@ def test_gains_shares_and_energy_are_stored() -> None:
     numbers = {"gain": 90.0, "share": 0.9, "parameters": 2}
     assert found["candidates"] == [{**name, **numbers}]
     assert found["accepted"] == [name]
-    assert (found["energy"], found["channels"], found["total_gain"]) == (1.0, 1, 0.0)
+    assert (found["energy"], found["channels"], found["sampled_energy"]) == (1.0, 1, 200.0)
 
 
 def test_effects_are_removed_from_a_copy_of_the_library(tmp_path: Path) -> None:

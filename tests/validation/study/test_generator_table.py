@@ -53,4 +53,4 @@ def test_the_page_has_all_figures_and_wrong_verdicts() -> None:
     assert "| `open_cases` | `full` | tyre_slip | road_grade |" in page
     assert "| `open_cases` | `clean` | none | road_grade |" in page
     assert "1 (`01234567`)" in page
-    assert "| `FORM_ERROR` | 0.3 |" in page
+    assert "| `FORM_ERROR` | 0.4 |" in page
