@@ -14,6 +14,8 @@ PEAKS = 4
 """Number of periods, the half wave over the whole path included."""
 BINS_PER_WAVE = 8
 """Bins of the path in the shortest wave, which limits the error of a phase."""
+SLOW_PART = 0.2
+"""Part of the steps along the path that are slow: a short wave shows in these alone."""
 MAX_BINS = 2**18
 """Most bins of a path; the shortest wave is longer for a very long one."""
 BACKGROUND_WIDTH = 41
@@ -29,28 +31,32 @@ def strongest_orders(
     at an order q is the sum over recordings and outputs of |sum_k e_k exp(i q path_k)|^2 (Scargle
     1982), relative to the median power of neighbouring orders. Correlated innovations are whitened
     by their correlation from sample to sample first, so that a drift does not hide a wave. Waves
-    shorter than two steps along the path are left out. The first order is half a wave over the
-    longest path. Empty if nothing moves.
+    shorter than two steps of the slow part of the path are left out. The first order is half a wave
+    over the longest path. Empty if nothing moves.
     """
-    longest = max((float(np.ptp(one)) for one in paths if len(one)), default=0.0)
-    steps = np.concatenate([np.diff(one) for one in paths]) if paths else np.empty(0)
-    pace = float(np.sqrt(np.mean(steps**2))) if len(steps) else 0.0
+    pairs = [pair for pair in zip(paths, innovations, strict=True) if len(pair[0]) > 1]
+    lengths = [float(np.ptp(path)) for path, _ in pairs]
+    longest = max(lengths, default=0.0)
+    steps = np.abs(np.concatenate([np.diff(path) for path, _ in pairs] or [np.empty(0)]))
+    moving = steps[steps > 0.0]
+    pace = float(np.quantile(moving, SLOW_PART)) if len(moving) else 0.0
     if not (math.isfinite(longest) and longest > 0.0 and pace > 0.0):
         return ()
     shortest = max(2.0 * pace, BINS_PER_WAVE * longest / MAX_BINS)
     width = shortest / BINS_PER_WAVE
     size = 2 ** math.ceil(math.log2(2.0 * longest / width + 2.0))
-    power = sum(_binned_power(*one, width, size) for one in zip(paths, innovations, strict=True))
+    power = sum(_binned_power(path, values, width, size) for path, values in pairs)
     orders = 2.0 * np.pi / (size * width) * np.arange(size // 2 + 1)
     resolution = 2.0 * np.pi / longest
     wide = max(3, int(BACKGROUND_WIDTH * resolution / orders[1])) | 1
     relative = power / np.maximum(median_filter(power, wide), np.finfo(float).tiny)
     is_open = (orders >= max(low, resolution)) & (orders <= min(high, 2.0 * np.pi / shortest))
+    apart = 2.0 * np.pi / float(np.median([length for length in lengths if length > 0.0]))
     found = [float(np.clip(resolution / 2.0, low, high))]
     while np.any(is_open) and len(found) < PEAKS:
         best = int(np.argmax(np.where(is_open, relative, -1.0)))
         found.append(float(orders[best]))
-        is_open &= np.abs(orders - orders[best]) > resolution
+        is_open &= np.abs(orders - orders[best]) > apart
     return tuple(found)
 
 

@@ -100,8 +100,8 @@ def select_effects(
     """Return the effects that the training recordings support, at most `MAX_EFFECTS` (3).
 
     The candidate with the largest gain is accepted if it gains its threshold and explains most of
-    what any disturbance explains. If it explains less, a second effect is tried beside it: both are
-    accepted if they do so together. At last effects that the others make needless are dropped.
+    what any disturbance explains. If it explains less, and the base leaves more than an ordinary
+    disturbance, a second effect is tried beside it: both are accepted if they do so together. At last effects that the others make needless are dropped.
     Of the effects that could be the first one, one whose identifier is in `preferred` is taken, and
     its rivals are in `preferred` as well.
     """
@@ -111,6 +111,8 @@ def select_effects(
     if best is None:
         return found
     if best.share < first.least_share:
+        if first.is_ordinary:
+            return found
         pair = _select_pair(model_set, found, best, thresholds, log)
         if not pair.accepted:
             return pair

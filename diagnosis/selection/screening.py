@@ -50,7 +50,7 @@ def _screen(model_set: ModelSet, base: Estimate, candidate: Candidate) -> Estima
         here = evaluate_near(candidate, series, levels, point, base)
         if candidate.compiled.delays:
             here = with_best_gain_scale(here, series)
-        starts.append(restart_phases(here, series))
+        starts.append(min(here, restart_phases(here, series), key=lambda one: one.cost))
     starts.sort(key=lambda one: one.cost)
     halved = [
         iterate_with_jacobian(one, series, base.jacobian, HALVING_ITERATIONS)
