@@ -101,9 +101,9 @@ def select_effects(
 
     The candidate with the largest gain is accepted if it gains its threshold and explains most of
     what any disturbance explains. If it explains less, and the base leaves more than an ordinary
-    disturbance, a second effect is tried beside it: both are accepted if they do so together. At last effects that the others make needless are dropped.
-    Of the effects that could be the first one, one whose identifier is in `preferred` is taken, and
-    its rivals are in `preferred` as well.
+    disturbance, a second effect is tried beside it: both are accepted if they do so together. At
+    last effects that the others make needless are dropped. Of the effects that could be the first
+    one, one whose identifier is in `preferred` is taken, and its rivals are in `preferred` as well.
     """
     first = compare_candidates(model_set, base, model_set.applicable_effects(), log)
     found = Selection(first.base, first.base, (), first, first)
