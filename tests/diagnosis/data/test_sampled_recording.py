@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from diagnosis.data.sampled_recording import (
+    Hold,
     SampledRecording,
     decimate,
     has_feedthrough,
@@ -110,7 +111,7 @@ def test_what_is_shown_follows_from_the_input_of_its_own_sample() -> None:
 def with_holds(*inputs: list[float]) -> SampledRecording:
     """A held input, a linear one and one whose hold is open."""
     columns = np.array(inputs).T
-    holds = ("previous", "linear", None)
+    holds: tuple[Hold, ...] = ("previous", "linear", None)
     return SampledRecording(
         "a", Fraction(1, 100), Fraction(0), columns, np.zeros((len(columns), 1)), holds=holds
     )

@@ -48,6 +48,38 @@ modes:
 outputs: [x]
 """
 
+PARALLEL = """\
+language: 1
+automaton: parallel
+step: 0.1 ms
+parameters: {fast: {value: 400 1/s}, slow: {value: 2 1/s}}
+states:
+  x: {unit: rad, initial: 1 rad, range: [-9, 9]}
+  z: {unit: rad, initial: 0 rad, range: [-9, 9]}
+flow: {x: der(x) = -slow * x, z: der(z) = rate}
+regions:
+  gap:
+    initial: shut
+    modes:
+      shut:
+        equations: {rate: 0 rad/s}
+        transitions: {open: {when: x < 0.5 rad}}
+      open:
+        equations: {rate: fast * (x - z)}
+        transitions: {shut: {when: x > 0.6 rad}}
+outputs: [x, z]
+"""
+
+TANK = """\
+language: 1
+automaton: tank
+step: 0.1 s
+parameters: {a: {value: 0.01 m/s}}
+states: {h: {unit: m, initial: 1 m, range: [0, 2]}}
+flow: {h: "der(h) = -a * sqrt(max(h, 0 m) / 1 m)"}
+outputs: [h]
+"""
+
 COUNTER = """\
 language: 1
 automaton: counter
@@ -75,6 +107,15 @@ def rotor(friction: str) -> Automaton:
 def test_the_step_is_half_the_time_constant_of_the_fastest_component() -> None:
     assert time_resolution(rotor("100"), LONGEST) == STEP_RATE_PRODUCT / 200
     assert time_resolution(automaton(TWO_MODES, "heated.yaml"), LONGEST) == STEP_RATE_PRODUCT / 400
+
+
+def test_a_mode_of_a_parallel_region_counts_as_well() -> None:
+    found = time_resolution(automaton(PARALLEL, "parallel.yaml"), LONGEST)
+    assert found == STEP_RATE_PRODUCT / 400
+
+
+def test_the_infinite_slope_of_a_square_root_at_rest_does_not_count() -> None:
+    assert time_resolution(automaton(TANK, "tank.yaml"), LONGEST) == LONGEST
 
 
 def test_the_step_of_a_slow_model_is_the_longest_one() -> None:

@@ -10,11 +10,13 @@ import pytest
 
 from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
 from diagnosis.data.sampled_recording import SampledRecording, decimate
+from diagnosis.estimation.estimate import evaluate, with_best_gain_scale
 from diagnosis.estimation.innovations import NoiseLevels, measured_noise_levels
 from diagnosis.estimation.levenberg_marquardt import estimate_parameters
 from diagnosis.estimation.model_set import ModelSet, balance_disturbances
 from diagnosis.estimation.noise_level import ORDINARY_LEVEL, disturbance_units
 from diagnosis.model.candidate import Candidate
+from diagnosis.model.parameter_vector import vector_of
 from diagnosis.model.placed_effect import PlacedEffect, find_placements, shipped_effects
 from diagnosis.selection.comparison import effective_gain
 from language.loading.load import automaton_of
@@ -113,6 +115,29 @@ def test_a_clean_recording_gives_the_parameters_that_made_it(bench: ModelSet) ->
     found = estimate_parameters(candidate, series, noise_levels, {}).values(0)
     for name, value in TRUTH.items():
         assert found[name] == pytest.approx(value, rel=0.02), name
+
+
+def test_gains_that_are_too_large_get_a_factor_that_further_fits_keep(bench: ModelSet) -> None:
+    """Recordings without disturbances, for which the gains of a large disturbance are wrong."""
+    candidate = bench.compile_candidate(())
+    series = simulate_recordings(candidate, TRUTH)
+    units = disturbance_units(candidate, series, {})
+    levels = measured_noise_levels(series, {name: 30.0 * unit for name, unit in units.items()})
+    before = evaluate(candidate, series, levels, vector_of(candidate, len(series), TRUTH))
+    after = with_best_gain_scale(before, series)
+    factor = after.noise_levels.gain_scale
+    assert after.cost < before.cost - 100.0
+    assert factor < 0.5
+    assert np.array_equal(after.gains.steady_state, factor * before.gains.steady_state)
+    again = evaluate(candidate, series, after.noise_levels, after.point, after.prediction)
+    assert again.cost == pytest.approx(after.cost, abs=20.0)
+    assert with_best_gain_scale(after, series).noise_levels.gain_scale == factor
+    stopped = dataclasses.replace(
+        after,
+        gains=after.gains.scaled(0.0),
+        noise_levels=dataclasses.replace(levels, gain_scale=0.0),
+    )
+    assert with_best_gain_scale(stopped, series).noise_levels.gain_scale == factor
 
 
 def test_a_left_out_friction_gains_where_it_is_and_a_lag_does_not(bench: ModelSet) -> None:
