@@ -14,21 +14,24 @@ from diagnosis.criterion.explained_share import USUAL_FORM_ERROR, explained_shar
 from diagnosis.criterion.threshold import Thresholds
 from diagnosis.equation.discovery import DiscoveredEquation, discover_equation
 from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.levenberg_marquardt import estimate_parameters
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.localisation.location import Location
 from diagnosis.localisation.location_text import format_location
 from diagnosis.localisation.ranking import localise
+from diagnosis.model.parameter_vector import extend_vector
 from diagnosis.pipeline.diagnosis_case import Case
 from diagnosis.result.effect_naming import verdict_id
 from diagnosis.result.verdict import DecisionOutcome
 from diagnosis.selection.candidate_search import CandidateFit
+from diagnosis.selection.comparison import effective_gain
 from diagnosis.selection.forward_selection import (
     Selection,
     candidate_probabilities,
     select_effects,
 )
 from diagnosis.selection.intersample import LogCallback, fit_base
-from diagnosis.selection.output_error import fit_output_error, has_fading_memory
+from diagnosis.selection.output_error import OutputErrorFit, fit_output_error, has_fading_memory
 from diagnosis.unknown_input.detection import detect_unknown_input
 
 MIN_SIMULATED_SHARE = 0.5
@@ -55,30 +58,47 @@ def decide(case: Case, full_rate_set: ModelSet, log: LogCallback) -> DiagnosisDe
     Models predict each sample from those before it. A base that forgets its initial state is
     simulated over whole recordings first. If effects explain that but for the error of their form,
     they are the result. Else prediction is tried as well; if it names another effect, the one that
-    explains more decides.
+    simulates better decides.
     """
     model_set, base = fit_base(full_rate_set, log)
     locations = localise(model_set, base)
     log(format_location(locations, model_set))
-    simulated, share, known = None, 0.0, frozenset[str]()
-    if has_fading_memory(base, model_set.series):
-        log("the base forgets its initial state: whole recordings are simulated")
-        found = fit_output_error(full_rate_set, base)
-        selection = select_effects(found.model_set, found.base, case.thresholds, log)
-        share = _simulated_share(selection)
-        known = frozenset(one.placed_effect.id for one in selection.accepted)
-        if share >= MIN_SIMULATED_SHARE:
-            series = dataclasses.replace(model_set, series=found.model_set.series)
-            outcome = _outcome_of(selection, series)
-            simulated = DiagnosisDecision(series, selection, locations, outcome, case.thresholds)
-        if simulated is not None and share >= 1.0 - USUAL_FORM_ERROR**2:
-            return simulated
-        log(f"effects explain {share:.0%} of the simulations: prediction is tried")
+    if not has_fading_memory(base, model_set.series):
+        return _decide_by_prediction(case, model_set, base, locations, frozenset(), log)
+    log("the base forgets its initial state: whole recordings are simulated")
+    found = fit_output_error(full_rate_set, base)
+    selection = select_effects(found.model_set, found.base, case.thresholds, log)
+    share = _simulated_share(selection)
+    simulated_set = dataclasses.replace(model_set, series=found.model_set.series)
+    simulated = DiagnosisDecision(
+        simulated_set, selection, locations, _outcome_of(selection, simulated_set), case.thresholds
+    )
+    if share >= 1.0 - USUAL_FORM_ERROR**2:
+        return simulated
+    log(f"effects explain {share:.0%} of the simulations: prediction is tried")
+    known = frozenset(one.placed_effect.id for one in selection.accepted)
     predicted = _decide_by_prediction(case, model_set, base, locations, known, log)
-    first = predicted.selection.accepted[:1]
-    is_other = bool(first) and first[0].placed_effect.id not in known
-    is_better = is_other and predicted.selection.share > share
-    return predicted if simulated is None or is_better else simulated
+    is_simulated = share >= MIN_SIMULATED_SHARE
+    if is_simulated and not _simulates_better(found, selection, predicted.selection):
+        return simulated
+    return predicted
+
+
+def _simulates_better(found: OutputErrorFit, simulated: Selection, predicted: Selection) -> bool:
+    """Return whether the effects of a comparison of predictions, fitted to whole simulations, gain
+    over those of the comparison of simulations, which may have missed them.
+    """
+    effects = [one.placed_effect for one in predicted.accepted]
+    known = {one.placed_effect.id for one in simulated.accepted}
+    if not effects or effects[0].id in known:
+        return False
+    series = found.model_set.series
+    candidate = found.model_set.try_compile(effects)
+    if candidate is None:
+        return False
+    start = extend_vector(candidate, predicted.model.candidate, predicted.model.point, {})
+    model = estimate_parameters(candidate, series, found.base.noise_levels, start)
+    return effective_gain(model, simulated.model, simulated.first.correlation, len(series)) > 0.0
 
 
 def _decide_by_prediction(

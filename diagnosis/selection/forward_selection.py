@@ -103,7 +103,8 @@ def select_effects(
     what any disturbance explains. If it explains less, and the base leaves more than an ordinary
     disturbance, a second effect is tried beside it: both are accepted if they do so together. At
     last effects that the others make needless are dropped. Of the effects that could be the first
-    one, one whose identifier is in `preferred` is taken, and its rivals are in `preferred` as well.
+    one, one whose identifier is in `preferred` is taken, and its rivals and further effects are in
+    `preferred` as well.
     """
     first = compare_candidates(model_set, base, model_set.applicable_effects(), log)
     found = Selection(first.base, first.base, (), first, first)
@@ -119,9 +120,12 @@ def select_effects(
         found = pair
     else:
         found = _accept(model_set, found, best, log)
+    is_preferred = found.accepted[0].placed_effect.id in preferred
     while len(found.accepted) < MAX_EFFECTS:
         best = _best_candidate(model_set, found.last, thresholds)
         if best is None or best.share < found.last.least_share:
+            break
+        if is_preferred and best.placed_effect.id not in preferred:
             break
         found = _accept(model_set, found, best, log)
     found = _drop_needless(model_set, found, thresholds, log)
