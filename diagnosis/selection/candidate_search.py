@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -113,7 +113,7 @@ def _fit_fully(
         series,
     )
     if first.cost > screened.cost:
-        first = with_normal_equations(screened, series)
+        first = with_normal_equations(replace(screened, exhausted_jacobian=None), series)
     if integrated_autocorrelation(first, series) < MAX_AUTOCORRELATION:
         return first
     starts = [
