@@ -30,6 +30,8 @@ modes:
 outputs: [x]
 """
 FIXED = "value: 2"
+HELD = np.zeros(1, dtype=np.int64)
+"""The input is constant between samples."""
 
 
 def slider(number: str = "float64", only: str = FIXED) -> Program:
@@ -46,13 +48,7 @@ def test_without_a_gain_it_moves_as_the_interpreter(number: str) -> None:
     page = np.array(list(columns.page.values()))
     with build_predictor(made, columns) as library:
         run = Predictor(columns, library).predict(
-            page,
-            inputs,
-            np.zeros((200, 1)),
-            no_gain[:0],
-            no_gain,
-            1,
-            linear_inputs=np.zeros(inputs.shape[1], dtype=np.int64),
+            page, inputs, np.zeros((200, 1)), no_gain[:0], no_gain, 1, linear_inputs=HELD
         )
     theirs = Interpreter(made)
     found = []

@@ -142,14 +142,9 @@ def test_a_predictor_reads_the_tables_that_its_page_does_not_hold(
     inputs, no_gain = np.tile([0.4, 0.7], (5, 1)), np.zeros((1, 1, 1))
     with build_predictor(program, columns) as library:
         page = np.array(list(columns.page.values()))
+        held = np.zeros(2, dtype=np.int64)
         run = Predictor(columns, library).predict(
-            page,
-            inputs,
-            np.zeros((5, 1)),
-            no_gain[:0],
-            no_gain,
-            1,
-            linear_inputs=np.zeros(inputs.shape[1], dtype=np.int64),
+            page, inputs, np.zeros((5, 1)), no_gain[:0], no_gain, 1, linear_inputs=held
         )
     theirs, found = Interpreter(program), []
     for row in inputs:
