@@ -86,56 +86,71 @@ def compare_candidates(
 ) -> Round:
     """Return the comparison of effects beside a base.
 
-    A candidate contains the base, so its fit can show that the fit of the base ended in a local
-    minimum. The base is then fitted again from the parameters of the best candidate, and compared
-    once more. No candidate is fitted if the base leaves less than `least_energy` above its floor.
-    A base that is fitted by simulation has no free disturbance, so its effects are compared with
-    each other. Whether it leaves `least_energy` is measured above the noise of the signals.
+    A free disturbance or a candidate contains the base, so its fit can show that the fit of the
+    base ended in a local minimum. The base is then fitted again from the parameters of the best
+    one. If a candidate shows it, the comparison is repeated. No candidate is fitted if the base
+    leaves less than `least_energy` above its floor. A base that is fitted by simulation has no free
+    disturbance, so its effects are compared with each other. Whether it leaves `least_energy` is
+    measured above the noise of the signals.
     """
     effects = tuple(placed_effects)
-    compared = _compare(model_set, base, effects, log, least_energy)
-    better = _fit_base_again(model_set, compared)
+    free = _free_disturbances(model_set, base)
+    better = _fit_base_again(model_set, base, free.values(), log)
+    if better is not None:
+        base, free = better, _free_disturbances(model_set, better)
+    compared = _compare(model_set, base, free, effects, log, least_energy)
+    fits = [one.estimate for one in compared.candidates if one.estimate is not None]
+    better = _fit_base_again(model_set, base, fits, log)
     if better is None:
         return compared
-    log(f"the base is fitted again: {base.cost - better.cost:.0f} nats")
-    return _compare(model_set, better, effects, log, least_energy)
+    free = _free_disturbances(model_set, better)
+    return _compare(model_set, better, free, effects, log, least_energy)
 
 
-def _fit_base_again(model_set: ModelSet, compared: Round) -> Estimate | None:
-    """Return the base fitted from the parameters of the best candidate or free disturbance.
+def _fit_base_again(
+    model_set: ModelSet, base: Estimate, models: Iterable[Estimate], log: LogCallback
+) -> Estimate | None:
+    """Return the base fitted from the parameters of the best of some models that contain it.
 
     It is None if that does not gain `MIN_BASE_GAIN` (20 nats).
     """
-    base, series = compared.base, model_set.series
-    fits = [one.estimate for one in compared.candidates if one.estimate is not None]
-    best = min([base, *fits, *compared.free.values()], key=lambda one: one.cost)
-    if (base.cost - best.cost) / compared.correlation < MIN_BASE_GAIN:
+    series = model_set.series
+    best = min([base, *models], key=lambda one: one.cost)
+    correlation = integrated_autocorrelation(best, series)
+    if (base.cost - best.cost) / correlation < MIN_BASE_GAIN:
         return None
     start = extend_vector(base.candidate, best.candidate, best.point, {})
     fit = partial(estimate_parameters, base.candidate, series, base.noise_levels, start)
     fitted = model_set.load_or_fit("base again", base.candidate, [start, base.noise_levels], fit)
     again = with_best_gain_scale(fitted, series)
-    gain = (base.cost - again.cost) / compared.correlation
-    return again if gain >= MIN_BASE_GAIN else None
+    if (base.cost - again.cost) / correlation < MIN_BASE_GAIN:
+        return None
+    log(f"the base is fitted again: {base.cost - again.cost:.0f} nats")
+    return again
+
+
+def _free_disturbances(model_set: ModelSet, base: Estimate) -> dict[str, Estimate]:
+    """Return the fits of the base with a free disturbance, by place."""
+    is_simulated = base.noise_levels.is_output_error
+    places = () if is_simulated else disturbance_locations(model_set, base)
+    return {
+        f"{section}.{one.place}": free_disturbance(model_set, base, one) for section, one in places
+    }
 
 
 def _compare(
     model_set: ModelSet,
     base: Estimate,
+    free: Mapping[str, Estimate],
     placed_effects: tuple[PlacedEffect, ...],
     log: LogCallback,
     least_energy: float,
 ) -> Round:
-    """Return the comparison with the base as it is fitted."""
-    is_simulated = base.noise_levels.is_output_error
-    places = () if is_simulated else disturbance_locations(model_set, base)
-    free = {
-        f"{section}.{one.place}": free_disturbance(model_set, base, one) for section, one in places
-    }
+    """Return the comparison with the base and its free disturbances as they are fitted."""
     flexible = min(free.values(), key=lambda one: one.cost, default=base)
     start = extend_vector(base.candidate, flexible.candidate, flexible.point, {})
     floor = least_variances([base, *free.values()])
-    if is_simulated:
+    if base.noise_levels.is_output_error:
         floor = np.minimum(floor, base.noise_levels.outputs**2)
     if remaining_energy(base, floor) < least_energy:
         placed_effects = ()
