@@ -23,6 +23,7 @@ from diagnosis.selection.candidate_search import CandidateFit
 from language.loading.load import automaton_of
 from language.loading.recording_map_reader import read_map
 from language.model.automaton import Automaton
+from language.overlays.effect_reader import Effect
 from language.overlays.expand_document import Project, expand_document, read_document
 from modewright.runtime.blas_threads import SingleThreadedBlas
 
@@ -44,13 +45,15 @@ def main() -> None:
     given.result.write_text(json.dumps({**found, "cpu_s": cpu}, indent=1))
 
 
-def decide_case(folder: Path, reverses_effects: bool = False) -> dict[str, Any]:
-    """Return the decision on a case folder as JSON (`record`)."""
+def decide_case(
+    folder: Path, reverses_effects: bool = False, effects: tuple[Effect, ...] | None = None
+) -> dict[str, Any]:
+    """Return the decision on a case folder as JSON (`record`), with the library by default."""
     project = Project(Path())
     document = read_document(folder / "spec.yaml")
     automaton = automaton_of(document, project)
     mapping = read_map(read_document(folder / "map.yaml"), project)
-    effects = library_effects(project)
+    effects = library_effects(project) if effects is None else effects
     case = Case(
         expand_document(document, project),
         project,
