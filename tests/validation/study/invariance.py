@@ -137,7 +137,7 @@ def transform_and_decide(case: Path, transformation: Transformation) -> dict[str
         done = subprocess.run(
             [sys.executable, "-m", module, str(copy), str(result), *options],
             cwd=ROOT,
-            env=os.environ | ENVIRONMENT | transformation.environment,
+            env=os.environ | ENVIRONMENT | dict(transformation.environment),
             capture_output=True,
             text=True,
             timeout=MAX_TIME,
