@@ -47,9 +47,9 @@ def _window_medians(sizes: Reals) -> Reals:
 def quantum_of(values: Reals) -> float:
     """Return the quantisation step of a signal: the smallest difference of distinct values.
 
-    Differences up to 1e-9 times the largest magnitude (at least 1) are ignored; the result is 0 if
-    no difference is left. `values` must not contain NaN.
+    Differences up to 1e-9 times the largest magnitude are ignored; the result is 0 if no difference
+    is left. `values` must not contain NaN.
     """
     gaps = np.diff(np.unique(values))
-    gaps = gaps[gaps > 1e-9 * max(1.0, float(np.max(np.abs(values), initial=0.0)))]
+    gaps = gaps[gaps > 1e-9 * float(np.max(np.abs(values), initial=0.0))]
     return float(np.min(gaps)) if len(gaps) else 0.0

@@ -106,6 +106,17 @@ class SampledRecording:
         return np.asarray(self.measured[rows, np.arange(len(rows))], dtype=np.float64)
 
     @cached_property
+    def largest_measured(self) -> Reals:
+        """The largest magnitude of each compared output (outputs,), 0 if it is never known."""
+        known = np.where(np.isfinite(self.measured), np.abs(self.measured), 0.0)
+        return np.asarray(np.max(known, axis=0), dtype=np.float64)
+
+    @cached_property
+    def largest_inputs(self) -> Reals:
+        """The largest magnitude of each input (inputs,)."""
+        return np.asarray(np.max(np.abs(self.inputs), axis=0), dtype=np.float64)
+
+    @cached_property
     def noise(self) -> tuple[Reals, Reals]:
         """The noise standard deviations by `noise_of`: (outputs,) and (inputs,)."""
         seen, inputs = (

@@ -22,6 +22,11 @@ from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.data.stacked_recordings import stack_recordings
 from diagnosis.model.candidate import Candidate
 
+MIN_RELATIVE_NOISE = 1e-6
+"""Least noise of an output relative to its largest magnitude."""
+MIN_NOISE = 1e-12
+"""Noise [SI] of an output that is always 0."""
+
 
 @dataclass(frozen=True)
 class NoiseLevels:
@@ -173,13 +178,14 @@ def measured_noise_levels(
 ) -> NoiseLevels:
     """Return the noise levels of outputs and inputs: the medians over the recordings' `noise`.
 
-    The noise of an output is at least a millionth of the largest magnitude of any output (the
-    median over recordings). `process` gives the levels of the disturbance states; the Huber limits
-    are infinite.
+    The noise of an output is at least a millionth of its largest magnitude (the median over
+    recordings), and 1e-12 [SI] for an output that is always 0. `process` gives the levels of the
+    disturbance states; the Huber limits are infinite.
     """
     output_noise, inputs = [np.array([one.noise[k] for one in series]) for k in (0, 1)]
-    floor = [float(np.nanmax(np.abs(one.measured))) * 1e-6 + 1e-12 for one in series]
-    outputs = np.maximum(np.median(output_noise, axis=0), np.median(floor))
+    largest = np.median([one.largest_measured for one in series], axis=0)
+    floor = np.where(largest > 0.0, MIN_RELATIVE_NOISE * largest, MIN_NOISE)
+    outputs = np.maximum(np.median(output_noise, axis=0), floor)
     return NoiseLevels(outputs, np.median(inputs, axis=0), process, np.full(len(outputs), np.inf))
 
 

@@ -12,9 +12,9 @@ from diagnosis.data.array_types import Reals
 MAX_QUOTIENT = 1e12
 """A larger difference quotient makes the linearisation invalid."""
 MIN_STATE_STEP = 1e-9
-"""Smallest step of a state, 1e7 times the rounding error of a state near 1."""
+"""Smallest step of a state as a fraction of its value, 1e7 times the rounding error."""
 INPUT_STEP = 1e-4
-"""Step of an input as a fraction of its magnitude, and its smallest value in SI units."""
+"""Step of an input as a fraction of its magnitude."""
 
 RCOND = 1e-15
 """Relative size below which a singular value counts as 0."""
@@ -40,18 +40,18 @@ def linearise(
     states: Reals,
     inputs: Reals,
     state_steps: Reals,
+    input_sizes: Reals,
 ) -> LinearModel | None:
     """Return the linear model over one sample near `states` (states,) in a mode under `inputs`.
 
     The derivatives are central differences with the steps `state_steps` (states,), at least
-    `MIN_STATE_STEP`, and `INPUT_STEP` times the inputs, at least `INPUT_STEP`. `c` refers to the
+    `MIN_STATE_STEP` times the states, and `INPUT_STEP` times `input_sizes` (inputs,), the
+    magnitudes of the inputs; a magnitude of 0 counts as 1. `c` refers to the
     states at the end of the sample: the outputs' derivatives times the pseudoinverse of `phi`. The
     result is None if a derivative of a state reaches `MAX_QUOTIENT` (1e12) or is NaN.
     """
-    steps, pushes = (
-        np.maximum(state_steps, MIN_STATE_STEP),
-        np.maximum(INPUT_STEP * np.abs(inputs), INPUT_STEP),
-    )
+    steps = np.maximum(state_steps, MIN_STATE_STEP * np.abs(states))
+    pushes = INPUT_STEP * np.where(input_sizes > 0.0, input_sizes, 1.0)
     phi, shown, b = predictor.compute_jacobians(
         calibration_page, inputs, mode, substeps, states, steps, pushes
     )

@@ -29,20 +29,25 @@ def disturbance_units(
     """Return the unit [SI] of each disturbance state, by name.
 
     One unit changes some output by its measured noise after the median reference time, by the model
-    linearised at the start of the first recording (at most 1e12 for a disturbance without
-    response). `start` are values [SI] of parameters. Raises ValueError if the model cannot be
-    linearised there.
+    linearised at the start of a recording; of several recordings it is the median. It is at most
+    1e12 for a disturbance without response. `start` are values [SI] of parameters. Raises
+    ValueError if the model cannot be linearised at the start of any recording.
     """
     output_noise = measured_noise_levels(series, {}).outputs
-    mode, operating_point = next(iter(operating_points(candidate, series, None).items()))
-    page = candidate.calibration_page(start, series[0])
-    linear = linearise_near(candidate, page, mode, operating_point.states, operating_point.inputs)
-    if linear is None:
-        raise ValueError("the base is unstable where the first recording starts")
     count = round(float(np.median([one.sample_count(1.0) for one in series])))
-    ahead = linear.c @ np.linalg.matrix_power(linear.phi, count)
+    responses = []
+    for one in series:
+        mode, point = next(iter(operating_points(candidate, [one], None).items()))
+        page = candidate.calibration_page(start, one)
+        linear = linearise_near(candidate, page, mode, point)
+        if linear is not None:
+            ahead = linear.c @ np.linalg.matrix_power(linear.phi, count)
+            responses.append(np.max(np.abs(ahead) / output_noise[:, np.newaxis], axis=0))
+    if not responses:
+        raise ValueError("the base is unstable where the recordings start")
+    response = np.median(responses, axis=0)
     units = {}
     for name in candidate.disturbance_states:
-        noise_ratios = np.abs(ahead[:, candidate.predictor.states.index(name)]) / output_noise
-        units[name] = 1.0 / max(float(np.max(noise_ratios)), 1e-12)
+        place = candidate.predictor.states.index(name)
+        units[name] = 1.0 / max(float(response[place]), 1e-12)
     return units

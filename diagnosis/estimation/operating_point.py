@@ -65,30 +65,42 @@ def _compute_linearised_modes(
     """Return the linearised candidate in each mode without the cache."""
     found = {}
     for mode, point in operating_points(candidate, series, prediction).items():
-        linear = linearise_near(candidate, calibration_page, mode, point.states, point.inputs)
+        linear = linearise_near(candidate, calibration_page, mode, point)
         if linear is not None:
             found[mode] = linear, point.dwell_samples
     return found
 
 
+@dataclass(frozen=True)
+class OperatingPoint:
+    """A point where a mode is active: `states`, `inputs` and the median dwell time [samples].
+
+    `input_sizes` (inputs,) are the largest magnitudes of the inputs in all recordings.
+    """
+
+    states: Reals
+    inputs: Reals
+    dwell_samples: int
+    input_sizes: Reals
+
+
 def linearise_near(
-    candidate: Candidate, calibration_page: Reals, mode: int, states: Reals, inputs: Reals
+    candidate: Candidate, calibration_page: Reals, mode: int, point: OperatingPoint
 ) -> LinearModel | None:
     """Return the candidate linearised over one sample in a mode near a point; None if invalid.
 
     The steps of the states are `STATE_STEP_FRACTION` of their ranges; see `linearise`.
     """
-    substeps, sizes = candidate.compiled.substeps, STATE_STEP_FRACTION * candidate.state_ranges
-    return linearise(candidate.predictor, calibration_page, mode, substeps, states, inputs, sizes)
-
-
-@dataclass(frozen=True)
-class OperatingPoint:
-    """A point where a mode is active: `states`, `inputs` and the median dwell time [samples]."""
-
-    states: Reals
-    inputs: Reals
-    dwell_samples: int
+    return linearise(
+        candidate.predictor,
+        calibration_page,
+        mode,
+        candidate.compiled.substeps,
+        point.states,
+        point.inputs,
+        STATE_STEP_FRACTION * candidate.state_ranges,
+        point.input_sizes,
+    )
 
 
 def operating_points(
@@ -97,31 +109,38 @@ def operating_points(
     """Return an operating point of each mode in a prediction, the mode with the longest stay first.
 
     It lies in the longest stay of the mode, without its first and last fifth, at the sample where
-    the magnitude of the first measured output is largest, because friction is steep near
-    standstill. Modes whose stays are all shorter than `MIN_DWELL_SAMPLES` (5) are left out. Without
-    a prediction the result is the start of the first recording in its mode, at declared parameter
+    the measured outputs are largest, relative to their largest magnitudes, because friction is
+    steep near standstill. Of several longest stays it is the one with the largest outputs there.
+    Modes whose stays are all shorter than `MIN_DWELL_SAMPLES` (5) are left out. Without a
+    prediction the result is the start of the longest recording in its mode, at declared parameter
     values.
     """
+    input_sizes = np.max([one.largest_inputs for one in series], axis=0)
     if prediction is None:
-        return _initial_operating_point(candidate, series[0])
+        longest = max(series, key=lambda one: one.count)
+        return _initial_operating_point(candidate, longest, input_sizes)
+    output_sizes = np.max([one.largest_measured for one in series], axis=0)
     points = {}
     runs = prediction.runs
     lows, highs, modes, recordings = _dwell_intervals(runs)
     for mode in sorted(set(modes.tolist())):
         intervals = np.flatnonzero(modes == mode)
         lengths = highs[intervals] - lows[intervals]
-        best = intervals[np.argmax(lengths)]
-        if np.max(lengths) >= MIN_DWELL_SAMPLES:
-            one, states = (
-                series[recordings[best]],
-                runs.stacked.states[runs.starts[recordings[best]] :],
-            )
-            k = _largest_output_sample(one.measured, int(lows[best]), int(highs[best]))
-            dwell = max(1, round(median(lengths.tolist())))
-            points[mode] = (
-                int(np.max(lengths)),
-                OperatingPoint(states[k].copy(), one.inputs[k].copy(), dwell),
-            )
+        if np.max(lengths) < MIN_DWELL_SAMPLES:
+            continue
+        largest = [
+            (*_largest_output(series[recordings[k]].measured, lows[k], highs[k], output_sizes), k)
+            for k in intervals[lengths == np.max(lengths)]
+        ]
+        _, sample, best = max(largest, key=lambda one: one[0])
+        recording = recordings[best]
+        states = runs.stacked.states[runs.starts[recording] + sample]
+        inputs = series[recording].inputs[sample]
+        dwell = max(1, round(median(lengths.tolist())))
+        points[mode] = (
+            int(np.max(lengths)),
+            OperatingPoint(states.copy(), inputs.copy(), dwell, input_sizes),
+        )
     ordered = sorted(points.items(), key=lambda item: -item[1][0])
     return {mode: seen for mode, (_, seen) in ordered}
 
@@ -145,7 +164,7 @@ def _dwell_intervals(runs: StackedPrediction) -> tuple[Integers, Integers, Integ
 
 
 def _initial_operating_point(
-    candidate: Candidate, series: SampledRecording
+    candidate: Candidate, series: SampledRecording, input_sizes: Reals
 ) -> dict[int, OperatingPoint]:
     """Return the operating point at the first sample of a recording, by its mode."""
     predictor = candidate.predictor
@@ -155,15 +174,19 @@ def _initial_operating_point(
     run = predictor.predict(
         page, short, measured, none[:0], none, candidate.compiled.substeps, series.linear_inputs
     )
-    return {int(run.modes[0]): OperatingPoint(run.states[0].copy(), short[0], 1)}
+    return {int(run.modes[0]): OperatingPoint(run.states[0].copy(), short[0], 1, input_sizes)}
 
 
-def _largest_output_sample(measured: Reals, low: int, high: int) -> int:
-    """Return the sample at which the first output has its largest magnitude in a stay.
+def _largest_output(measured: Reals, low: int, high: int, sizes: Reals) -> tuple[float, int]:
+    """Return the largest sum of the outputs' magnitudes in a stay, and its sample.
 
-    The first and last fifth of the stay are left out. In a very short stay it is the middle.
+    The magnitudes are relative to `sizes` (outputs,). The first and last fifth of the stay are left
+    out. In a very short stay the sample is the middle, with a sum of 0.
     """
     margin = (high - low) // 5
-    inner = np.abs(measured[low + margin : high - margin, 0])
-    known = np.where(np.isfinite(inner), inner, -1.0)
-    return low + margin + int(np.argmax(known)) if len(known) else (low + high) // 2
+    inner = np.abs(measured[low + margin : high - margin]) / np.where(sizes > 0.0, sizes, 1.0)
+    level = np.sum(np.where(np.isfinite(inner), inner, 0.0), axis=1)
+    if not len(level):
+        return 0.0, int((low + high) // 2)
+    k = int(np.argmax(level))
+    return float(level[k]), int(low + margin + k)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, strategies as st
 
 from diagnosis.data.noise_estimate import noise_of, quantum_of
 
@@ -25,3 +26,10 @@ def test_a_quantised_signal_is_no_surer_than_its_steps() -> None:
 
 def test_too_short_a_signal_has_none() -> None:
     assert noise_of(np.array([1.0, np.nan, 2.0])) == 0.0
+
+
+@given(st.floats(1e-9, 1e9))
+def test_the_unit_of_a_signal_scales_its_steps_and_its_noise(factor: float) -> None:
+    values = np.round(np.sin(np.arange(400) * 0.05) / 0.01) * 0.01
+    assert quantum_of(factor * values) == pytest.approx(factor * quantum_of(values))
+    assert noise_of(factor * values) == pytest.approx(factor * noise_of(values))
