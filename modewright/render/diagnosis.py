@@ -7,6 +7,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from diagnosis.model.parameter_text import in_unit
 from diagnosis.pipeline.parameter_fit import STRONG_CORRELATION, Fit
 from diagnosis.report.diagnosis_report import DiagnosisReport, replace_non_finite
 from diagnosis.report.report_text import format_two_digits, summary_lines
@@ -22,8 +23,9 @@ def print_diagnosis(screen: Console, report: DiagnosisReport) -> None:
 def print_fit(screen: Console, fit: Fit) -> None:
     """Print a table of the fitted parameters, then misfits, strong correlations and other notes.
 
-    Misfits are those of free simulation before and after the fit. Correlations are printed from
-    STRONG_CORRELATION on. Parameters that the data do not determine are named last.
+    Values are in declared units. Misfits are those of free simulation before and after the fit.
+    Correlations are printed from STRONG_CORRELATION on. Parameters that the data do not determine
+    are named last.
     """
     table = Table(
         "parameter", "declared", "fitted", "std", "unit", "of prior", "goes with", "",
@@ -35,11 +37,11 @@ def print_fit(screen: Console, fit: Fit) -> None:
             if one.strongest_correlation
             else ""
         )
-        quantity = one.quantity
+        unit, quantity = fit.automaton.parameters[one.name].unit, one.quantity
         table.add_row(
-            one.name, f"{one.declared:.5g}", f"{quantity.value:.5g}",
-            format_two_digits(quantity.std), quantity.unit, f"{one.prior_ratio:.0%}", goes,
-            one.note,
+            one.name, f"{in_unit(one.declared, unit):.5g}", f"{in_unit(quantity.value, unit):.5g}",
+            format_two_digits(quantity.std / float(unit.factor)), unit.text,
+            f"{one.prior_ratio:.0%}", goes, one.note,
         )  # fmt: skip
     screen.print(table)
     for name, misfit in fit.misfits.items():
