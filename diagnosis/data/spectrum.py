@@ -9,10 +9,9 @@ from diagnosis.data.array_types import Reals
 
 
 def spectrum(values: Reals, rate: float, max_window: int) -> tuple[Reals, Reals]:
-    """Return frequencies [Hz] and the one-sided power spectral density of a signal (Welch 1967).
+    """Return frequencies [Hz] and one-sided power spectral density (Welch 1967) at `rate` [Hz].
 
-    `values` (samples,) are sampled at `rate` [Hz]. The Hann windows have `max_window` samples (all
-    if there are fewer), overlap by half, and the mean of each window is subtracted.
+    Hann windows of `max_window` samples (all if fewer) overlap by half.
     """
     length = min(len(values), max_window)
     frequencies, power = welch(

@@ -61,10 +61,7 @@ UNUSED_FACTOR = 1e-6
 
 @dataclass(frozen=True)
 class ColumnHypothesis:
-    """A change of a column: advanced by `lag` [s], negated (`factor` -1) or not used (`factor` 0).
-
-    `column` counts the inputs first, then the compared outputs.
-    """
+    """A column (inputs, then outputs) advanced by `lag` [s] and negated (-1) or unused (0)."""
 
     column: int
     lag: float = 0.0
@@ -72,17 +69,11 @@ class ColumnHypothesis:
 
     @property
     def is_error(self) -> bool:
-        """Whether the change is an error: a negation, or a lag from `MIN_LAG` (0.1 s) on.
-
-        False for a smaller lag, which is usual, and for an input that is not used.
-        """
+        """Whether the change is a negation or a lag of at least `MIN_LAG` (0.1 s)."""
         return self.factor < 0 or abs(self.lag) >= MIN_LAG
 
     def is_similar(self, other: ColumnHypothesis) -> bool:
-        """Return whether two hypotheses have the same column and factor, and lags within 0.06 s.
-
-        The limit is `CLOCK_TOLERANCE`.
-        """
+        """Return whether column and factor are equal and lags differ by at most 0.06 s."""
         near = abs(self.lag - other.lag) <= CLOCK_TOLERANCE
         return near and (self.column, self.factor) == (other.column, other.factor)
 
@@ -102,12 +93,10 @@ def find_clock_and_sign_errors(
     mapping: RecordingMap,
     recordings: Sequence[Recording],
 ) -> list[Finding] | None:
-    """Return findings on wrong clocks and signs, or None if the model cannot be used.
+    """Return errors on clocks and signs, or None if the model cannot be used.
 
-    The findings are errors of kind `sign` or `clock_offset`, those of `find_column_errors`. A
-    window with too few samples (`sample_windows`, `decimate`), or without a value of an input, is
-    left out. None is returned if no window remains, if the model does not compile or no C compiler
-    works, or if the model cannot be linearised.
+    Windows that cannot be sampled are left out. None if no window remains, or the model does not
+    compile or cannot be linearised.
     """
     seen = compared_outputs(mapping, automaton)
     sampled: list[SampledRecording] = []
@@ -149,17 +138,10 @@ def find_column_errors(
 ) -> list[ColumnError]:
     """Return one error that is common to all recordings, else at most one error of each recording.
 
-    Recordings not longer than four times `MAX_LAG` (0.48 s) are left out; without any other one the
-    result is empty. The error of a recording is the hypothesis with the largest gain. It has to be
-    an error (`is_error`), to gain `MIN_GAIN` (100 nats) and `MIN_GAIN_PER_SAMPLE` (0.2) times the
-    samples, and to exceed the gains of small lags and unused inputs by `HARMLESS_GAIN_FACTOR` and
-    those of other columns by `OTHER_COLUMN_FACTOR`.
-
-    A common error meets the same conditions for the sums over all recordings in which the model
-    does not diverge. At least two recordings, a third of all and more than `SHARED_FRACTION` of
-    those with an error must have one that is similar to it; the lag is their median, and the result
-    has no other error. Otherwise an error of a recording counts only if each recording with an
-    error in the same column has a similar one.
+    Recordings not longer than four times `MAX_LAG` are left out. The error of a recording is its
+    clearest hypothesis (`_clearest_hypothesis`), if it is similar to the others of that column. A
+    common error is clear in the sum of gains, and similar to those of two recordings, a third of
+    all and `SHARED_FRACTION` of those with an error.
     """
     series = [one for one in series if float(one.period) * one.count > 4.0 * MAX_LAG]
     if not series:
@@ -192,10 +174,7 @@ def find_column_errors(
 def _is_uniform(
     hypothesis: ColumnHypothesis, hypotheses: Sequence[ColumnHypothesis | None]
 ) -> bool:
-    """Return whether a column has the same error in every recording that has one.
-
-    Different errors rather indicate missing physics.
-    """
+    """Return whether all errors of a column are similar; others indicate missing physics."""
     return all(
         one.is_similar(hypothesis) for one in hypotheses if one and one.column == hypothesis.column
     )
@@ -206,9 +185,8 @@ def hypothesis_gains(
 ) -> Mapping[ColumnHypothesis, Reals]:
     """Return the log-likelihood gain [nats] of each hypothesis in each recording (recordings,).
 
-    Hypotheses are lags from -`MAX_LAG` to `MAX_LAG` in steps of `LAG_STEP` (without 0) and the
-    negation of each input and output, and each input not used. Inputs that are constant in a
-    recording are not tested. The gain is -inf in a recording where the model diverges.
+    Hypotheses are lags to `MAX_LAG` in steps of `LAG_STEP`, negations, and inputs not used;
+    constant inputs are not tested. The gain is -inf where the model diverges.
     """
     inputs = series[0].inputs.shape[1]
     moving_inputs = [
@@ -232,11 +210,9 @@ def hypothesis_gains(
 
 
 def apply_hypothesis(series: SampledRecording, hypothesis: ColumnHypothesis) -> SampledRecording:
-    """Return the inner part of a recording with a hypothesis applied to its column.
+    """Return a recording with a hypothesis applied to its column, without `MAX_LAG` at both ends.
 
-    `MAX_LAG` seconds are cut off at both ends, so that every lag has values; the column is advanced
-    by the lag, rounded to samples, and multiplied by the factor (`UNUSED_FACTOR` instead of 0).
-    `start` of the result is still that of the recording.
+    The lag is rounded to samples; `start` of the result is still that of the recording.
     """
     margin = round(MAX_LAG / float(series.period))
     late = round(hypothesis.lag / float(series.period))
@@ -264,11 +240,7 @@ def _evaluate_declared(candidate: Candidate, series: Sequence[SampledRecording])
 
 
 def _high_pass_costs(model: Estimate, series: Sequence[SampledRecording]) -> Reals:
-    """Return the negative log-likelihood [nats] of the high-pass filtered innovations
-    (recordings,).
-
-    It is infinite for a recording in which the run diverged.
-    """
+    """Return -log L [nats] (recordings,) of high-pass innovations, inf for a diverged run."""
     values, found = [model.values(0)] * len(series), []
     (there,) = predict_at_points(
         model.candidate, series, [values], model.gains, model.noise_levels.huber_limits
@@ -302,9 +274,7 @@ def _high_pass(innovations: Reals, period: float) -> Reals:
 
 
 def _finite_gains(before: Reals, after: Reals) -> Reals:
-    """Return the gains (recordings,), -inf where the
-    model diverges with or without the hypothesis.
-    """
+    """Return the gains (recordings,), -inf where one of both models diverges."""
     known = np.isfinite(before) & np.isfinite(after)
     found = np.where(known, before, 0.0) - np.where(known, after, 0.0)
     return np.where(known, found, -np.inf)
@@ -313,7 +283,7 @@ def _finite_gains(before: Reals, after: Reals) -> Reals:
 def _clearest_hypothesis(
     gains: Mapping[ColumnHypothesis, float], min_gain: float
 ) -> ColumnHypothesis | None:
-    """Return the hypothesis with the largest gain; None if that is not a clear error.
+    """Return the hypothesis of largest gain if it is a clear error, else None.
 
     Its gain must reach `min_gain` and exceed the gains of harmless changes and of other columns by
     their factors.

@@ -91,9 +91,7 @@ SPEEDS, POSITIONS = ("rad/s", "m/s"), ("rad", "m")
 
 @dataclass(frozen=True)
 class SignalExcitation:
-    """The excitation of one signal: range [SI], sign changes,
-    step sizes [SI] and bandwidth [Hz].
-    """
+    """The excitation of a signal: range and steps [SI], sign changes and bandwidth [Hz]."""
 
     name: str
     unit: str
@@ -138,10 +136,8 @@ def analyse_excitation(
 ) -> Excitation:
     """Return the excitation of recordings, cut into the windows that are used.
 
-    `checks` give the noise of channels. Channels in units of speed are speeds, also if they are
-    inputs; a recording without a speed has the rates of its positions instead. Without another
-    input, speeds that are inputs count as inputs too. The effects are those of `EFFECT_NEEDS`, in
-    its order.
+    `checks` give the noise of channels. A recording without a speed has the rates of its positions
+    instead; without another input, speeds that are inputs count as inputs.
     """
     used = [
         _with_derived_speeds(piece)
@@ -218,10 +214,7 @@ def _signal_excitation(
 
 
 def _step_sizes(times: Reals, values: Reals, span: float, floor: float) -> list[float]:
-    """Return the signed sizes of steps: changes within `STEP_TIME` well above the noise `floor`.
-
-    Each step is counted once.
-    """
+    """Return the signed sizes of changes within `STEP_TIME` well above the noise `floor`."""
     if len(values) < 3 or span <= 6.0 * floor:
         return []
     later = np.minimum(np.searchsorted(times, times + STEP_TIME), len(times) - 1)
@@ -330,10 +323,7 @@ def _paired_samples(
 def _has_both_signs_at_one_speed(
     used: Sequence[Recording], first: SignalExcitation, second: SignalExcitation
 ) -> bool:
-    """Return whether an input has both signs in one of eight speed classes.
-
-    Each sign must be in more than a tenth of the class's samples.
-    """
+    """Return whether each sign has a tenth of the samples of one of eight speed classes."""
     torque, speed = _paired_samples(used, first, second)
     if not len(torque) or second.low == second.high:
         return False

@@ -41,11 +41,10 @@ MAX_SIMULATED_TIME = Fraction(24)
 
 @dataclass(frozen=True)
 class OutputAgreement:
-    """The agreement of a measured output with the simulated one: measured = gain * simulated(t -
-    lag).
+    """The agreement of outputs: measured = gain * simulated(t - lag).
 
-    The gain is the one of fast or of slow motion, whichever is nearer to 1. `level` is the ratio of
-    their root mean squares in the second half.
+    The gain is that of fast or of slow motion, whichever is nearer to 1. `level` is the ratio of
+    root mean squares in the second half.
     """
 
     recording: str
@@ -75,11 +74,10 @@ class OutputAgreement:
 def compare_with_simulation(
     recordings: Sequence[Recording], reference: ReferenceModel
 ) -> list[OutputAgreement]:
-    """Return the agreement of each output with a simulation, for a piece of each recording window.
+    """Return the agreement of each output with a simulation, in the piece of each window.
 
-    Pieces are the most excited ones of `MIN_PIECE` to `MAX_PIECE` (4 to 10 s); once
-    `MAX_SIMULATED_TIME` (24 s) is reached, later windows are left out. Outputs that
-    `compare_signals` cannot compare are left out. Inputs faster than 100 Hz are thinned out.
+    Pieces are the most excited ones of 4 to 10 s, `MAX_SIMULATED_TIME` (24 s) in all. Inputs faster
+    than 100 Hz are thinned out.
     """
     agreements: list[OutputAgreement] = []
     remaining_time = MAX_SIMULATED_TIME
@@ -98,12 +96,7 @@ def compare_with_simulation(
 
 
 def most_excited_piece(piece: Recording, max_length: Fraction) -> Recording:
-    """Return the most excited part of a recording of length `max_length` [s]; all of it if shorter.
-
-    The parts begin at multiples of half of that length. The most excited one has the largest sum,
-    over inputs, of the standard deviation of the changes over that of the values; the first one is
-    taken if several are equal.
-    """
+    """Return the most excited part of a recording of length `max_length` [s]."""
     if piece.end - piece.start <= max_length:
         return piece
     count = int(2 * (piece.end - piece.start) / max_length)
@@ -126,9 +119,7 @@ def _decimate_inputs(piece: Recording) -> Recording:
 
 
 def _excitation_level(piece: Recording, start: Fraction, end: Fraction) -> float:
-    """Return the sum over inputs of the spread of
-    their changes relative to that of their values.
-    """
+    """Return the sum over inputs of the spread of changes over that of values."""
     total = 0.0
     for channel in piece.channels.values():
         inside = (channel.seconds >= float(start)) & (channel.seconds <= float(end))
@@ -159,10 +150,8 @@ def compare_signals(
 ) -> OutputAgreement | None:
     """Return the agreement of the rates of change of two signals, smoothed by `spread` [s].
 
-    The lag of largest correlation within `MAX_LAG` (1 s) is taken, or that of the most negative one
-    if its magnitude is larger by `REVERSAL_MARGIN` (0.15); the gain is then negative. The first
-    `TRANSIENT_TIME` (0.8 s) are left out. The result is None if less than 1 s remains, the
-    simulation is not finite, or a rate is constant.
+    The gain is negative if the reversed signal correlates better by `REVERSAL_MARGIN`. The result
+    is None if less than 1 s remains, the simulation is not finite, or a rate is constant.
     """
     if len(comparison.times) < 2:
         return None
@@ -195,10 +184,7 @@ def compare_signals(
 def _low_frequency_rates(
     comparison: OutputComparison, grid: Reals, lag: int
 ) -> list[tuple[Reals, Reals]]:
-    """Return both rates below the resonances at a lag, as a list of one pair; empty if too short.
-
-    A fast sweep has little there but drift.
-    """
+    """Return a list with both rates below the resonances at a lag; empty if too short."""
     shifted = grid + lag * GRID_STEP
     kept = (shifted >= grid[0]) & (shifted <= grid[-1])
     if np.count_nonzero(kept) <= _kernel_size(GAIN_SMOOTHING_STD):

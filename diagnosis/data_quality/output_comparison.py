@@ -83,12 +83,9 @@ def simulate_free_run(
 ) -> FreeRun:
     """Return a simulation under recorded inputs from the first measured states, without feedback.
 
-    It begins when every recorded input has a value, and ends with the last channel. An input
-    without a channel has the constant of the map, else its default, else 0. A state that is a
-    compared output begins at its latest measured value. Outputs are interpolated linearly between
-    rows, one major step apart, at the time stamps of the measurements. `programs` is a cache for
-    other recordings of the same automaton and is extended. Raises SpecError if the recording ends
-    before every input has a value.
+    It begins when every recorded input has a value. An input without a channel has the constant of
+    the map, else its default, else 0. `programs` is a cache for other recordings of the same
+    automaton. Raises SpecError if the recording ends before every input has a value.
     """
     input_channels = [c for c in recording.channels.values() if c.column.to in automaton.inputs]
     outputs = [c for c in recording.channels.values() if c.column.compare in automaton.outputs]

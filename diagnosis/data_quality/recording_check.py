@@ -37,10 +37,7 @@ MIN_SAMPLES = 100
 
 @dataclass(frozen=True)
 class RecordingCheck:
-    """Properties of each channel, findings (errors first) and the excitation.
-
-    `agreements` relate recorded outputs to simulated ones; there are none without an automaton.
-    """
+    """The channels, findings (errors first), excitation and agreement with a simulation."""
 
     channels: tuple[ChannelCheck, ...]
     findings: tuple[Finding, ...]
@@ -63,11 +60,8 @@ def check_recordings(
 ) -> RecordingCheck:
     """Return the checks of recordings; with an automaton also of units, signs and clocks.
 
-    Values beyond `MAX_VALUE` are reported and then dropped. Recordings with a finding of
-    `DISQUALIFYING_KINDS` are not compared with the model; without an automaton their speeds are
-    compared with each other instead. `find_clock_errors` searches wrong clocks and signs by
-    prediction, or returns None if it cannot; the clock findings of the simulation are then
-    warnings. `file_findings` are those on the files as such. Sampled automata are not simulated.
+    `find_clock_errors` searches wrong clocks and signs by prediction, or returns None if it cannot;
+    the clock findings of the simulation are then warnings. Sampled automata are not simulated.
     Raises SpecError if the simulation of a recording fails.
     """
     mismatches = {one.name: find_clock_mismatches(one) for one in recordings}
@@ -124,10 +118,7 @@ def check_recordings(
 def _check_channels(
     recordings: Sequence[Recording], earlier: Sequence[Finding]
 ) -> tuple[list[ChannelCheck], list[Finding]]:
-    """Return the properties of each channel, and the earlier findings with those on channels.
-
-    In recordings whose time leaps, gaps and dropped samples are not reported.
-    """
+    """Return the checks, and all findings without gaps in recordings whose time leaps."""
     leapt = {finding.recording for finding in earlier if finding.kind == "leap"}
     channels, findings = [], list(earlier)
     for recording in recordings:
@@ -145,11 +136,10 @@ def _merge_clock_errors(
     recordings: Sequence[Recording],
     find_clock_errors: ClockErrorSearch,
 ) -> list[Finding]:
-    """Return findings with those on clocks and signs replaced by `find_clock_errors` where
-    possible.
+    """Return findings with those on clocks and signs replaced by `find_clock_errors`.
 
-    A sign error of an input needs a sign finding of the simulation in that recording too. If the
-    search is impossible, clock findings become warnings.
+    A sign error of an input needs a sign finding of the simulation too. If the search is
+    impossible, clock findings become warnings.
     """
     others = [finding for finding in findings if finding.kind not in ("clock_offset", "sign")]
     wrong = {finding.recording for finding in others if finding.severity == "error"}
@@ -177,7 +167,7 @@ def _find_missing_signals(
     mapping: RecordingMap,
     automaton: Automaton | None,
 ) -> list[Finding]:
-    """Return errors for channels that a recording lacks and for inputs that must not be constant.
+    """Return errors for missing channels and for inputs that must not be constant.
 
     An input without a default that is constant everywhere drives nothing. One that is noisy in most
     recordings cannot be constant in another one.
@@ -211,10 +201,7 @@ def _find_missing_signals(
 
 
 def used_columns(mapping: RecordingMap, automaton: Automaton | None) -> list[str]:
-    """Return the columns of a map that an automaton reads or compares, in the order of the map.
-
-    All columns are returned without an automaton, and if it uses none.
-    """
+    """Return the columns that an automaton reads or compares; all if there are none."""
     if automaton is None:
         return list(mapping.columns)
     return [

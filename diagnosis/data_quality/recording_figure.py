@@ -35,12 +35,7 @@ COLOURS = {"error": "#cc3344", "warning": "#b58900", "note": GREY}
 
 
 def draw_recordings(recordings: Sequence[Recording], check: RecordingCheck, title: str) -> Picture:
-    """Return the picture of checked recordings, with the findings.
-
-    On the left are the first `MAX_CHANNELS` (6) channels over time, recordings in a row, with
-    windows, gaps and stuck intervals shaded; on the right the main input over the main speed, its
-    spectrum and the testable effects; below the first `MAX_FINDINGS` (5) lines of findings.
-    """
+    """Return the picture of checked recordings: channels, operating range, effects, findings."""
     names = list(dict.fromkeys(one.name for one in check.channels))[:MAX_CHANNELS]
     count = max(1, len(format_findings(check.findings)[:MAX_FINDINGS]))
     height = 1.6 + 1.25 * max(len(names), 5) + 0.24 * count

@@ -36,10 +36,9 @@ class ReferenceModel:
 
     @cached_property
     def coarse_automaton(self) -> Automaton:
-        """The automaton with the longest major step that is stable and resolves motion of 4 Hz.
+        """The automaton with the longest stable step that resolves motion of 4 Hz.
 
-        The step is the smallest stability limit over `STABILITY_MARGIN` (3), at most `MAX_STEP` (4
-        ms), but not below the step of the automaton, which is unchanged without stability limits.
+        The step of an automaton without stability limits is unchanged.
         """
         motion = program_of(self.automaton).integration
         limits = [limit.step for limit in motion.stability_limits] if motion else []
@@ -50,11 +49,7 @@ class ReferenceModel:
         return dataclasses.replace(self.automaton, step=step)
 
     def simulate(self, recording: Recording) -> FreeRun:
-        """Return a free run of the coarse automaton under recorded inputs.
-
-        Programs are kept for further recordings. Raises SpecError if the recording ends before
-        every input has a value.
-        """
+        """Return a free run of the coarse automaton; SpecError as in `simulate_free_run`."""
         return simulate_free_run(
             self.coarse_automaton, recording, self.mapping, self.run_programs, self._programs
         )
@@ -66,10 +61,7 @@ _cache: list[ReferenceModel] = []
 def cached_reference(
     automaton: Automaton, mapping: RecordingMap, run_programs: RunFunction
 ) -> ReferenceModel:
-    """Return the reference model of an automaton and a map.
-
-    The latest one is cached with its Programs and returned if all arguments are identical.
-    """
+    """Return the reference model; the latest one is reused for identical arguments."""
     if _cache:
         latest = _cache[0]
         same = latest.automaton is automaton and latest.mapping is mapping

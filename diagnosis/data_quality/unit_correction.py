@@ -62,11 +62,7 @@ class ColumnCorrection:
     reason: str = ""
 
     def apply(self, recording: Recording) -> Recording:
-        """Return a recording with the correction applied; `recording` is not changed.
-
-        The times and values of both columns are exchanged, or the values divided by `factor`.
-        KeyError without the column.
-        """
+        """Return a recording with the correction applied; KeyError without the column."""
         channels = dict(recording.channels)
         one = channels[self.column]
         if self.other:
@@ -79,10 +75,7 @@ class ColumnCorrection:
         return dataclasses.replace(recording, channels=channels)
 
     def to_finding(self, recording: str) -> Finding:
-        """Return the error on a recording, or on all of them for the name "".
-
-        Its kind is `swap` for an exchange, else `unit`, with the reason as a question.
-        """
+        """Return the error `swap` or `unit` on a recording, or on all of them for an empty name."""
         if self.other:
             text = f"`{self.column}` and `{self.other}` are exchanged: they go with the model "
             return Finding("swap", recording, self.column, text + "the other way round", "error")
@@ -99,12 +92,9 @@ def find_corrections(
 ) -> list[Finding]:
     """Return findings on corrections of recordings that do not agree with the model.
 
-    An output disagrees if |log gain| + 1 - |correlation| exceeds `MIN_DISTANCE` (0.7). At most
-    `MAX_TESTED_RECORDINGS` (3), those of largest distance, are simulated with each possible factor
-    or exchange of columns; a correction must make all outputs agree, and the nearest one is taken.
-    A recording with a unit error in `findings` is skipped if all its outputs correlate by more than
-    `SURE_CORRELATION`. If all recordings that were corrected (at least two) have the same
-    correction, and `SHARED_FRACTION` of all disagree, it is reported once for all.
+    The `MAX_TESTED_RECORDINGS` (3) of largest distance are simulated with each possible correction;
+    the nearest one that makes all outputs agree is taken. A unit error in `findings` is kept if all
+    outputs correlate by `SURE_CORRELATION`. A correction that all have is reported once.
     """
     by_name = {one.name: [r for r in agreements if r.recording == one.name] for one in recordings}
     sure = {
@@ -147,9 +137,7 @@ def find_corrections(
 def find_millisecond_time(recording: Recording, reference: ReferenceModel) -> list[Finding]:
     """Return a finding if the time of a recording may be in milliseconds, else an empty list.
 
-    It may be if the shortest median period of a channel is at least `MAX_SAMPLE_TIME` (0.5 s) and
-    `MAX_SAMPLE_STEPS` (200) steps of the model. The finding is an error if all outputs agree with
-    the model after a division of the time by 1000, else a warning.
+    It is an error if all outputs agree after a division by 1000, else a warning.
     """
     usual = min(
         (
@@ -190,11 +178,7 @@ def _best_correction(
     max_distance: float,
     reference: ReferenceModel,
 ) -> ColumnCorrection | None:
-    """Return the correction after which all outputs agree with the model, the one at least
-    distance.
-
-    The distance must be below `max_distance`; the result is None if there is no such correction.
-    """
+    """Return the nearest correction within `max_distance` that makes all outputs agree, if any."""
     distances = {}
     for correction in corrections:
         try:
@@ -210,10 +194,7 @@ def _best_correction(
 def _candidate_corrections(
     recording: Recording, automaton: Automaton, agreements: Sequence[OutputAgreement]
 ) -> list[ColumnCorrection]:
-    """Return the corrections that are possible for the used columns, by their dimensions.
-
-    A factor that leaves a gain of an output above `MAX_GAIN` is left out.
-    """
+    """Return the corrections that fit the dimensions and leave gains below `MAX_GAIN`."""
     gains = {agreement.channel: agreement.gain for agreement in agreements}
     used = {
         name: channel.column
@@ -262,8 +243,7 @@ def _distance(agreement: OutputAgreement) -> float:
 def replace_corrected(findings: Sequence[Finding], corrections: Sequence[Finding]) -> list[Finding]:
     """Return findings with corrections in place of other findings on the same recordings.
 
-    A unit correction of a channel and recording that already have a unit finding is dropped. With a
-    correction of all recordings ("") only corrections are returned; else they come last.
+    A unit correction beside a unit finding is dropped; one of all recordings ("") replaces all.
     """
     same = {(f.channel, f.recording) for f in findings if f.kind == "unit"}
     new = [

@@ -51,14 +51,12 @@ def find_unit_sign_clock_errors(
     mapping: RecordingMap,
     recordings: Sequence[Recording],
 ) -> list[Finding]:
-    """Return findings on signs, units and clocks, for all recordings together or for single ones.
+    """Return findings on signs, units and clocks, for all recordings or for single ones.
 
-    Only clear agreements count. With a clear agreement in fewer than two recordings the findings of
-    each are returned. Otherwise an error that at least two and more than `SHARED_FRACTION` (0.6) of
-    the recordings show is reported once; then other findings are left out unless it is a clock
-    offset. If half of the recordings have unit errors, only these are returned. A clock offset of a
-    single recording is a warning and needs an increase of the correlation by more than
-    `SINGLE_RECORDING_MARGIN`.
+    With fewer than two clear recordings the findings of each are returned. Else an error that
+    `SHARED_FRACTION` of them show is reported once, and hides others unless it is a clock offset.
+    If half of the recordings have unit errors, only these are returned. A clock offset of a single
+    recording is a warning.
     """
     own = {
         recording.name: _find_errors(
@@ -112,11 +110,8 @@ def find_unit_sign_clock_errors(
 def agrees_with_other_outputs(finding: Finding, agreements: Sequence[OutputAgreement]) -> bool:
     """Return whether a unit or scale finding is refuted by the level of the other outputs.
 
-    This is so if the median `level` of its channel is within `FACTOR_TOLERANCE` (30 %) of that of
-    the other clear outputs with a gain within `MAX_SCALE_RATIO`, in the same recordings. False for
-    other kinds of findings, without such outputs, or if a level is 0. Missing physics can make one
-    output oscillate much more than in the simulation, which looks like a scale error; a wrong unit
-    would change its level relative to the others.
+    Missing physics can make one output oscillate much more than in the simulation, which looks like
+    a scale error; a wrong unit would change its level relative to the others.
     """
     if finding.kind not in ("unit", "scale"):
         return False
@@ -134,9 +129,7 @@ def _is_shared(
     by_recording: Mapping[str, Sequence[Finding]],
     agreements: Sequence[OutputAgreement],
 ) -> bool:
-    """Return whether most of the recordings with a
-    clear agreement of the channel have this finding.
-    """
+    """Return whether most recordings with a clear agreement of the channel have this finding."""
     clear = {r.recording for r in agreements if r.is_clear and r.channel == finding.channel}
     count = sum(_has_similar(findings, finding) for findings in by_recording.values())
     if not clear:  # An input: if one output alone is clear, the finding names that output.
@@ -172,10 +165,7 @@ def _find_errors(
     mapping: RecordingMap,
     recordings: Sequence[Recording],
 ) -> list[Finding]:
-    """Return findings from the clear agreements of one recording, or of all for the name "".
-
-    Clock offsets are only reported if there are no sign and unit errors.
-    """
+    """Return sign and unit errors of clear agreements, or clock errors if there are none."""
     clear = [agreement for agreement in agreements if agreement.is_clear]
     by_channel = {
         channel: [r for r in clear if r.channel == channel]
@@ -211,9 +201,7 @@ class _AgreementsByChannel:
         ]
 
     def _attribute(self, channels: Sequence[str]) -> tuple[str, str]:
-        """Return the channel to report and its name in a sentence:
-        an input if all outputs are affected.
-        """
+        """Return the channel to report and its name: an input if all outputs are affected."""
         if len(channels) == len(self.gains) and self.inputs:
             if len(channels) > 1:
                 return self.inputs[0], f"input `{self.inputs[0]}`"
@@ -255,9 +243,7 @@ class _AgreementsByChannel:
         return found
 
     def _shared_scale_finding(self, outputs: Sequence[str], channel: str, subject: str) -> Finding:
-        """Return the finding on all outputs: a wrong scale of the input,
-        or a unit that they share.
-        """
+        """Return the finding on all outputs: a scale of the input or a shared unit."""
         size = median(abs(self.gains[name]) for name in outputs)
         if not _unit_error_reason(1.0 / size, column_dimension(self.mapping.columns[channel])):
             reasons = {
@@ -273,9 +259,7 @@ class _AgreementsByChannel:
         return self._scale_finding(channel, subject, 1.0 / size, False)
 
     def _scale_finding(self, channel: str, subject: str, size: float, is_output: bool) -> Finding:
-        """Return a unit error if a factor of units explains the size,
-        else a warning on the scale.
-        """
+        """Return a unit error if a factor explains the size, else a scale warning."""
         dimension = column_dimension(self.mapping.columns[channel])
         share = f"{size:.3g} times" if size > 1.0 else f"1/{1.0 / size:.3g} of"
         source = _unit_error_reason(size, dimension)
@@ -325,9 +309,7 @@ def _varies(recording: Recording, name: str) -> bool:
 def _unit_error_reason(
     size: float, dimension: Dimension, tolerance: float = FACTOR_TOLERANCE
 ) -> str:
-    """Return the unit error that explains a ratio of measured to simulated,
-    or "" if there is none.
-    """
+    """Return the unit error that explains a ratio of measured to simulated, or an empty text."""
     near = [
         (abs(math.log(size / factor)), reason)
         for factor, unit, reason in UNIT_FACTORS

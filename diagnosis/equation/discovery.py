@@ -62,11 +62,9 @@ def discover_equation(
 ) -> DiscoveredEquation | None:
     """Return the formula with the largest gain over the base of a comparison, or None.
 
-    At most `MAX_FITS` formulas, at the first `MAX_LOCATIONS` of `locations` (in the order of their
-    ranks) with a gain and no accepted effect, are fitted. The formula must gain `min_gain` [nats]
-    and explain the same share as an effect (`MIN_SHARE`). A formula at a location of higher rank,
-    fitted again from the parameters of the best one, replaces it if it has more than
-    `LEADING_FRACTION` of its gain. `log` gets a line for each fitted formula.
+    `MAX_FITS` formulas at the first `MAX_LOCATIONS` locations with a gain and no accepted effect
+    are fitted. The formula must gain `min_gain` [nats] and explain `MIN_SHARE`. One at a location
+    of higher rank, fitted again from the best one, replaces it with `LEADING_FRACTION` of its gain.
     """
     base, equations = compared.base, []
     for formula, location in _propose_formulas(model_set, base, locations):
@@ -98,12 +96,9 @@ def _format_equation(equation: DiscoveredEquation) -> str:
 def _propose_formulas(
     model_set: ModelSet, base: Estimate, locations: Sequence[Location]
 ) -> list[tuple[FormulaEffect, Location]]:
-    """Return the formulas to fit, at most `MAX_FITS`: the best at each location, then the next
-    best.
+    """Return up to `MAX_FITS` formulas: the best at each location, then the next best.
 
-    Candidates are the best single terms and a pair of terms at each location with a gain and
-    without an accepted effect. Formulas without a regression gain, or that the model does not
-    accept, are left out.
+    They are the best single terms and a pair of terms at each location.
     """
     options: list[tuple[float, Location, EquationRegression, tuple[TermColumns, ...]]] = []
     places = [one for one in locations if one.gain > 0.0 and not one.is_accepted][:MAX_LOCATIONS]
@@ -133,16 +128,12 @@ def _propose_formulas(
 
 
 def _values_beside_disturbance(base: Estimate, location: Location) -> dict[str, float]:
-    """Return the parameters [SI] that were fitted
-    together with the free disturbance of a location.
-    """
+    """Return the parameters [SI] fitted beside the free disturbance of a location."""
     return (location.free_model or base).values(0)
 
 
 def _choose_base(model_set: ModelSet, base: Estimate, location: Location) -> Estimate:
-    """Return the base at its own parameters or at those beside the free disturbance,
-    which costs less.
-    """
+    """Return the cheaper base: with its own parameters or those beside the disturbance."""
     point = vector_of(
         base.candidate, len(model_set.series), _values_beside_disturbance(base, location)
     )
@@ -157,10 +148,7 @@ def _fit_formula(
     location: Location,
     starts: Sequence[Mapping[str, float]],
 ) -> DiscoveredEquation | None:
-    """Return a formula fitted from the best of several `starts` [SI] of the base's parameters.
-
-    The result is None if the model with the formula is invalid or the fit diverges.
-    """
+    """Return the formula fitted from the best of `starts` [SI]; None if invalid or diverged."""
     try:
         candidate = model_set.compile_candidate((formula.placed_effect,))
     except SpecError:

@@ -44,10 +44,9 @@ class DisturbanceResponse:
     steady_state_gains: Reals = field(repr=False)
 
     def predict(self, disturbance: Sequence[Reals]) -> tuple[Prediction, ...]:
-        """Return the predictions of all recordings while the disturbance follows given values.
+        """Return the predictions while the disturbance [SI] follows values (samples,).
 
-        `disturbance` is in SI units, (samples,) for each recording; a prediction has all outputs of
-        the model with the disturbance, and no Huber limits.
+        A prediction has all outputs, and no Huber limits.
         """
         pages, recorded = self._with_disturbance(disturbance)
         predictor, substeps = self.candidate.predictor, self.candidate.compiled.substeps
@@ -58,11 +57,7 @@ class DisturbanceResponse:
         return runs.split()
 
     def predict_innovations(self, disturbance: Sequence[Reals]) -> list[Reals]:
-        """Return the innovations of compared outputs while the disturbance follows given values.
-
-        `disturbance` is (samples,) for each recording. The result is (samples, outputs) for each,
-        after the burn-in: the innovations of `predict`, without storing states.
-        """
+        """Return the innovations of `predict` after burn-in, (samples, outputs) each."""
         pages, recorded = self._with_disturbance(disturbance)
         predictor, substeps = self.candidate.predictor, self.candidate.compiled.substeps
         runs = predictor.predict_points(
@@ -72,9 +67,7 @@ class DisturbanceResponse:
         return self._after_burn_in([runs[0][0][low:high] for low, high in edges])
 
     def _with_disturbance(self, disturbance: Sequence[Reals]) -> tuple[Reals, StackedRecordings]:
-        """Return calibration pages, and the recordings
-        with the disturbance as a measured output.
-        """
+        """Return the pages, and recordings in which the disturbance is measured."""
         together, candidate = stack_recordings(self.series), self.candidate
         recorded, seen = together.recorded, candidate.predictor.outputs
         nothing = np.full((len(recorded.inputs), len(self.element_torques)), np.nan)
@@ -91,11 +84,7 @@ class DisturbanceResponse:
         return [self.model.values(k) for k in range(len(self.series))]
 
     def innovations(self, predictions: Sequence[Prediction]) -> list[Reals]:
-        """Return the innovations of the compared outputs from predictions, (samples, outputs) each.
-
-        The burn-in of the first recording is cut off each; element torques and disturbance are left
-        out.
-        """
+        """Return the innovations of compared outputs after burn-in, (samples, outputs) each."""
         return self._after_burn_in([one.innovations for one in predictions])
 
     def _after_burn_in(self, innovations: Sequence[Reals]) -> list[Reals]:
@@ -110,10 +99,8 @@ def build_disturbance_response(
 ) -> DisturbanceResponse:
     """Return the model of a fit, compiled with a disturbance at `section.place`.
 
-    The disturbance is named `probe_<place>`, cut to 25 characters. It has the effects of the fit
-    and all disturbances of the model set besides. Its Kalman gains are those of the fit; the gain
-    from the disturbance output to the disturbance state is 1. Raises SpecError if the disturbance
-    cannot be placed, KeyError for a section other than flow, elements and outputs.
+    Raises SpecError if the disturbance cannot be placed, KeyError for a section other than flow,
+    elements and outputs.
     """
     kind = DISTURBANCE_KIND_BY_SECTION[section]
     disturbance = model_set.scale_disturbance(disturbance_effect(kind, place))
@@ -134,10 +121,7 @@ def build_disturbance_response(
 
 
 def element_torques(automaton: Automaton) -> tuple[str, ...]:
-    """Return the names of the torques of elements, in the order of the elements.
-
-    Only elements whose `torque` is a single name are included, not those with an expression.
-    """
+    """Return the torques of elements that are single names, in the order of elements."""
     trees = [
         one.parts["torque"].tree for one in automaton.elements.values() if "torque" in one.parts
     ]
@@ -157,11 +141,7 @@ def _with_outputs(document: Document, names: Sequence[str]) -> Document:
 
 
 def _embed_gains(candidate: Candidate, model: Estimate, disturbance: str) -> tuple[Reals, Reals]:
-    """Return the Kalman gains of a model at the indices of a candidate with more states and
-    outputs.
-
-    The gain from the disturbance output to the disturbance state is 1, all others are 0.
-    """
+    """Return the gains of a model in a larger candidate, with 1 from disturbance to its state."""
     states, known = candidate.predictor.states, model.candidate.predictor
     rows = [states.index(name) for name in known.states]
     columns = [candidate.predictor.outputs.index(name) for name in known.outputs]

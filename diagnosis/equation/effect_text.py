@@ -28,10 +28,7 @@ RANGE_FACTOR = 10.0
 
 @dataclass(frozen=True)
 class FormulaEffect:
-    """An effect that consists of terms, with the `text` of its file.
-
-    `initial_values` are the start values of a fit, `phases` those of parameters per recording.
-    """
+    """An effect made of terms; `phases` are start values of parameters per recording."""
 
     placed_effect: PlacedEffect
     text: str = field(repr=False)
@@ -44,9 +41,7 @@ class FormulaEffect:
     ) -> str:
         """Return the formula with fitted values, such as `12.3 N*m * sin(3 * angle of w_w + 0.40)`.
 
-        The terms are joined with ` + `. `values` are the fitted quantities by qualified name,
-        `fitted` the values [SI] of each recording: a coefficient per recording is a list `{1.2,
-        3.4} N*m`, and a phase is the word `phase` if there are several recordings.
+        `values` are quantities by qualified name, `fitted` the values [SI] of each recording.
         """
         return " + ".join(
             _format_term(
@@ -68,13 +63,10 @@ def build_formula(
     weights: Sequence[Reals],
     number: int = 1,
 ) -> FormulaEffect:
-    """Return the sum of terms as an effect, with initial values.
+    """Return the sum of terms as an effect `unknown_<number>_at_<place>`, with initial values.
 
-    Its name is `unknown_<number>_at_<place>`. `weights` are the coefficients of each term,
-    (recordings, waves). A coefficient starts at their root mean square over recordings for a sine
-    or a coefficient per recording, else at their mean; its range is `RANGE_FACTOR` times the root
-    mean square. A model set identifies candidates by effect names, so `number` must be unique.
-    Raises SpecError if the text of the effect is invalid.
+    `weights` are the coefficients of each term, (recordings, waves). A model set identifies
+    candidates by effect names, so `number` must be unique. Raises SpecError for an invalid text.
     """
     parts = [
         _term_text(model_set, section, place, k, *pair)

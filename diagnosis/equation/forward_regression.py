@@ -20,10 +20,7 @@ RIDGE = 1e-6
 
 @dataclass(frozen=True)
 class TermColumns:
-    """A term as columns of a problem, at the indices `places`.
-
-    With `has_recording_coefficients` each recording has coefficients of its own.
-    """
+    """A term as the columns `places` of a problem, with shared or recording coefficients."""
 
     name: str
     places: tuple[int, ...]
@@ -34,8 +31,8 @@ class TermColumns:
 class RegressionProblem:
     """The products of columns and innovations, (recordings, parts, columns, columns).
 
-    The last column is the innovations. The first `parameters` columns are parameters of the model
-    in prior standard deviations. `samples` is the number of innovations.
+    The first `parameters` columns are parameters in prior standard deviations, the last one the
+    innovations; `samples` is their number.
     """
 
     products: Reals = field(repr=False)
@@ -46,9 +43,7 @@ class RegressionProblem:
 
 @dataclass(frozen=True)
 class SelectedTerm:
-    """A selected term with its penalised gain and its
-    cross-validated gain over earlier terms [nats].
-    """
+    """A term with its penalised and its cross-validated gain over earlier terms [nats]."""
 
     columns: TermColumns
     gain: float
@@ -64,8 +59,7 @@ def build_problem(
     """Return the regression problem of normalised innovations (samples,) of each recording.
 
     `parameters` (samples, parameters) and `features` (samples, columns) of each recording are the
-    decreases of the innovations per unit of each coefficient. Each recording is cut into `FOLDS`
-    (4) parts of consecutive samples, whose products are kept apart for the cross-validation.
+    decreases of the innovations per unit of each coefficient.
     """
     products = []
     for e, moved, wave in zip(innovations, parameters, features, strict=True):
@@ -80,11 +74,7 @@ def build_problem(
 def rank_terms(
     problem: RegressionProblem, columns: Sequence[TermColumns]
 ) -> list[tuple[float, TermColumns]]:
-    """Return the penalised gain [nats] of each term alone, with the term, in descending order.
-
-    The gain is the decrease of the cost, with the model's parameters fitted as well, minus the BIC
-    penalty of the term; it can be negative. Equal gains keep the order of `columns`.
-    """
+    """Return the penalised gain [nats] of each term alone with the term, in descending order."""
     before = _cost(problem, [])
     ranked = [
         (before - _cost(problem, [one]) - _complexity_penalty(problem, one), one) for one in columns
@@ -97,9 +87,8 @@ def select_terms(
 ) -> list[SelectedTerm]:
     """Return the terms of a forward selection, at most `max_terms`, in the order of selection.
 
-    Each step takes the term with the largest penalised gain over the terms before it; the selection
-    ends when that is below `min_gain` [nats]. A term after the first must also have a
-    cross-validated gain of at least `min_gain`; if it has not, the selection ends.
+    It ends when the penalised gain, or the cross-validated one of a further term, is below
+    `min_gain` [nats].
     """
     chosen: list[SelectedTerm] = []
     selected: list[TermColumns] = []
@@ -124,11 +113,7 @@ def select_terms(
 
 
 def coefficients_of(problem: RegressionProblem, selected: Sequence[TermColumns]) -> list[Reals]:
-    """Return the least-squares coefficients of each selected term, (recordings, waves) each.
-
-    The model's parameters are fitted together with them, with their priors. A term without
-    coefficients per recording has the same row for each recording.
-    """
+    """Return the least-squares coefficients of each selected term, (recordings, waves) each."""
     fit = _solve_least_squares(problem, selected, np.sum(problem.products, axis=1))
     shared, own = problem.parameters, 0
     coefficients = []
@@ -175,9 +160,7 @@ def _cross_validated_cost(problem: RegressionProblem, selected: Sequence[TermCol
 
 @dataclass(frozen=True)
 class _LeastSquaresFit:
-    """The shared coefficients, those per recording (recordings, n),
-    and the residual squares with priors.
-    """
+    """Coefficients, those per recording (recordings, n), and residual squares with priors."""
 
     shared: Reals
     per_recording: Reals
@@ -187,10 +170,7 @@ class _LeastSquaresFit:
 def _solve_least_squares(
     problem: RegressionProblem, selected: Sequence[TermColumns], products: Reals
 ) -> _LeastSquaresFit:
-    """Return the coefficients; those per recording are eliminated by Schur complements.
-
-    `products` (recordings, columns, columns) are summed over the parts that are used.
-    """
+    """Return the least-squares fit; recording coefficients go by Schur complements."""
     shared = problem.parameters + sum(
         len(one.places) for one in selected if not one.has_recording_coefficients
     )

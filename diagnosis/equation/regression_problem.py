@@ -36,12 +36,10 @@ class EquationRegression:
 def regression_at(
     model_set: ModelSet, model: Estimate, section: str, place: str
 ) -> EquationRegression:
-    """Return the regression of a model's innovations on the terms of `generate_terms` at a place.
+    """Return the regression of innovations on the terms of `generate_terms` at a place.
 
-    The columns are the responses of the innovations to each term as a disturbance at
-    `section.place`, preceded by the derivatives for the model's own parameters; all are weighted by
-    inverse standard deviations and Huber weights. Raises SpecError if no disturbance can be placed
-    there.
+    Responses to terms and parameters are weighted by inverse standard deviations and Huber weights.
+    Raises SpecError if no disturbance can be placed there.
     """
     probe = build_disturbance_response(model_set, section, place, model)
     zero_disturbance = [np.zeros(one.count) for one in model_set.series]
@@ -68,11 +66,7 @@ def regression_at(
 
 
 class _HuberWeights:
-    """Weights of innovations: inverse standard deviations, reduced beyond the Huber limits.
-
-    The weight is multiplied by sqrt(limit / |e|) beyond the limit (Huber 1964); unknown ones have
-    0.
-    """
+    """Inverse standard deviations times sqrt(limit / |e|) beyond the limit (Huber 1964), or 0."""
 
     def __init__(self, model: Estimate, innovations: Sequence[Reals]) -> None:
         size = np.sqrt(model.prediction.variances)
@@ -94,9 +88,7 @@ def _weighted_response(
     values: Sequence[Reals],
     weights: _HuberWeights,
 ) -> tuple[Reals, ...]:
-    """Return the weighted decrease of innovations per unit of a disturbance `values`,
-    by recording.
-    """
+    """Return the weighted decrease of innovations per unit of a disturbance, by recording."""
     size = float(np.sqrt(np.mean(np.concatenate(values) ** 2))) or 1.0
     after = response.predict_innovations([one * (TEST_DISTURBANCE / size) for one in values])
     moved = [(a - b) * (size / TEST_DISTURBANCE) for a, b in zip(before, after, strict=True)]
@@ -104,9 +96,7 @@ def _weighted_response(
 
 
 def _parameter_responses(model: Estimate, weights: _HuberWeights) -> tuple[Reals, ...]:
-    """Return the weighted decrease of innovations per coordinate (samples * outputs,
-    parameters).
-    """
+    """Return the weighted decreases per coordinate, (samples * outputs, parameters) each."""
     columns = [
         weights.weight_and_flatten(
             [-model.jacobian[name][part] for part in model.prediction.slices]

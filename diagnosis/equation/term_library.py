@@ -25,13 +25,11 @@ LIMIT_FRACTIONS = (0.4, 0.6, 0.8)
 
 @dataclass(frozen=True)
 class LibraryTerm:
-    """A summand without its coefficient.
+    """A summand without its coefficient; with an `order`, `text` is the factor of a sine.
 
-    `text` is an expression; with an `order` it is the factor of the sine of `order` times the angle
-    `th`, a state of the term. `states` are the states that the term adds: name to unit and flow.
-    `values` are the waves, (samples,) for each recording; a sine has two. `per_recording` gives
-    each recording a coefficient. `unit_expression` has the unit of the term if `text` reads its
-    states.
+    `states` are name to unit and flow of added states; `th` is the angle of an order. `values` are
+    the waves, (samples,) for each recording; a sine has two. `unit_expression` has the unit of a
+    `text` that reads states.
     """
 
     name: str
@@ -50,9 +48,7 @@ class LibraryTerm:
 
 @dataclass(frozen=True)
 class Signals:
-    """The signals of terms: values (samples,) of each recording and units by name,
-    and their roles.
-    """
+    """The values (samples,) of each recording, units and roles of the signals of terms."""
 
     values: Mapping[str, Sequence[Reals]] = field(repr=False)
     units: Mapping[str, str]
@@ -70,12 +66,7 @@ class Signals:
 def generate_terms(signals: Signals, section: str, output: str = "") -> Iterator[LibraryTerm]:
     """Yield the terms that may act at a place of a section, with their values.
 
-    First come a constant and a constant of each recording. For section "outputs" follow only terms
-    of the signal `output`: itself, lags and orders (multiples) of each angle. For any other
-    section: sign, value and square of each speed; powers, magnitude, limits, products with speeds,
-    lags, rate limits and growth of each torque; powers 2 and 3 and lags of each deflection; and
-    orders of each angle, alone and times each torque. The tested values are `ORDERS`, `LAGS`,
-    `RISE_TIMES`, `LIMIT_FRACTIONS`.
+    For "outputs" these are constants and terms of the signal `output`.
     """
     count = {name: [len(one) for one in values] for name, values in signals.values.items()}
     lengths = next(iter(count.values()))
@@ -133,9 +124,7 @@ def _power_terms(signals: Signals, name: str, powers: Sequence[int]) -> Iterator
 
 
 def _torque_terms(signals: Signals, name: str) -> Iterator[LibraryTerm]:
-    """Yield the terms of a torque: powers, magnitude, limits, products with speeds, lags,
-    growth.
-    """
+    """Yield powers, limits, speed products, lags, rate limits and growth of a torque."""
     values = signals.values[name]
     yield from _power_terms(signals, name, (1, 2, 3))
     yield _linear_term(f"the amount of {name}", f"abs({name})", [np.abs(x) for x in values])
@@ -228,10 +217,7 @@ def _low_pass(values: Reals, lag: float, period: float) -> Reals:
 def _order_terms(
     signals: Signals, rate: str, name: str, factor: Sequence[Reals]
 ) -> Iterator[LibraryTerm]:
-    """Yield sine and cosine waves of orders of an angle, times a signal.
-
-    Orders whose frequency exceeds 0.3 of the sample rate are left out.
-    """
+    """Yield waves of the orders of an angle below 0.3 of the sample rate, times a signal."""
     angles = [np.cumsum(w) * signals.period for w in signals.values[rate]]
     fastest = signals.largest(rate) / (2.0 * np.pi)
     for order in ORDERS:

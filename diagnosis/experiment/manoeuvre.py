@@ -23,21 +23,17 @@ FORCE_UNITS = ("N*m", "N")
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """A manoeuvre as a sampled recording; only its first measurements are known,
-    as initial state.
-    """
+    """A manoeuvre as a sampled recording; measured are only the initial outputs."""
 
     name: str
     series: SampledRecording = field(repr=False)
 
 
 def manoeuvres_for(model_set: ModelSet) -> list[Manoeuvre]:
-    """Return the manoeuvres for the driving input of a model set, in the order of the file.
+    """Return the manoeuvres of `manoeuvres.yaml` for the driving input of a model set.
 
-    The file is `manoeuvres.yaml`. The driving input is the first varying force or torque with both
-    signs in the recordings, or the first varying one if none has; the brake is the first other
-    varying one. Manoeuvres with a brake are left out without one. The result is empty if no force
-    or torque varies. Amplitudes are scaled to the largest recorded magnitude of an input.
+    This is the first varying force or torque, if possible with both signs; the brake is the next
+    varying one. Amplitudes are scaled to the largest recorded magnitude of an input.
     """
     forces = [name for name in model_set.automaton.inputs if _is_force(model_set, name)]
     names = list(model_set.automaton.inputs)
@@ -121,9 +117,7 @@ def _chirp(time: Reals, sweep: Sequence[float] | None) -> Reals:
 
 
 def _initial_outputs(model_set: ModelSet, part: float) -> Reals:
-    """Return recorded outputs at a sample where the
-    first one is nearest to a part of its largest.
-    """
+    """Return the recorded outputs whose first is nearest to a part of its largest."""
     rows = np.concatenate([one.measured for one in model_set.series])
     rows = rows[np.all(np.isfinite(rows), axis=1)]
     target = part * float(np.max(np.abs(rows[:, 0])))

@@ -42,11 +42,8 @@ squares of a disturbance that counts as most of it.
 def attribute_causes(model_set: ModelSet, location: Location) -> Iterator[str]:
     """Yield the paths of inputs or elements of a location's balance that fit its disturbance.
 
-    All elements (`elements.name`) of the balance follow for a large disturbance that correlates
-    with the acceleration; else, for a constant, the inputs (`inputs.name`) that take both signs;
-    else, for a ripple (an order of the angle as strongest correlate), all inputs; else nothing. The
-    limits are `MASS_CORRELATION`, `MASS_FRACTION`, `CONSTANT_FRACTION`, `CONSTANT_MARGIN` and
-    `RIPPLE_CORRELATION`. The order is that of the automaton.
+    They are the elements for a large disturbance that follows the acceleration, else the inputs
+    with both signs for a constant, else all inputs for a ripple.
     """
     paths = [f"inputs.{name}" for name in model_set.automaton.inputs]
     if _follows_acceleration(model_set, location):
@@ -59,12 +56,7 @@ def attribute_causes(model_set: ModelSet, location: Location) -> Iterator[str]:
 
 
 def is_inactive(model_set: ModelSet, location: Location, path: str) -> bool:
-    """Return whether an input is near 0 during most of a disturbance, so it cannot be its cause.
-
-    Near 0 is below `INACTIVE_AMPLITUDE` (2 %) of its largest magnitude, and most is more than
-    `INACTIVE_ENERGY` (half) of the squares of the disturbance. `path` is `section.name`; the result
-    is False for other sections than `inputs` and for a location without smoothed disturbances.
-    """
+    """Return whether an input `path` is near 0 (`INACTIVE_AMPLITUDE`) during most of a disturbance."""
     section, _, name = path.partition(".")
     if section != "inputs" or not location.disturbances:
         return False
@@ -81,11 +73,7 @@ def is_inactive(model_set: ModelSet, location: Location, path: str) -> bool:
 
 
 def balance_of(model_set: ModelSet, section: str, place: str) -> str:
-    """Return `flow.state` of the balance in which an input or inertia acts, else `section.place`.
-
-    An element with a `speed` acts in the balance of that speed; an input in the first balance with
-    a disturbance whose equation names it. Other places are returned unchanged.
-    """
+    """Return `flow.state` of the balance in which an input or inertia acts, else `section.place`."""
     element = model_set.automaton.elements.get(place)
     if section == "elements" and element is not None and "speed" in element.parts:
         return f"flow.{'.'.join(element.parts['speed'].reads)}"
@@ -114,8 +102,7 @@ def _follows_acceleration(model_set: ModelSet, location: Location) -> bool:
 def _is_constant(location: Location) -> bool:
     """Return whether a disturbance is a constant rather than the sign of the speed.
 
-    A line over the speed is allowed beside it, because a fit may have changed the friction of the
-    base.
+    A line over the speed is allowed: a fit may have changed the friction of the base.
     """
     speeds = _balance_states(location)
     if not speeds:
@@ -135,19 +122,14 @@ def _is_constant(location: Location) -> bool:
 
 
 def _has_both_signs(model_set: ModelSet, path: str) -> bool:
-    """Return whether an input takes both signs;
-    a brake has one sign and cannot be constant at rest.
-    """
+    """Return whether an input takes both signs; a brake does not and is no constant at rest."""
     column = list(model_set.automaton.inputs).index(path.partition(".")[2])
     values = np.concatenate([one.inputs[:, column] for one in model_set.series])
     return bool(values.min() < 0.0 < values.max())
 
 
 def _balance_states(location: Location) -> list[Reals]:
-    """Return the state of a location's balance where its disturbance is known, for each recording.
-
-    The list is empty for other places and unknown disturbances.
-    """
+    """Return the state of the balance beside its disturbance, by recording; else empty."""
     if location.section != "flow" or location.free_model is None or not location.disturbances:
         return []
     column = location.free_model.candidate.predictor.states.index(location.place)

@@ -36,12 +36,10 @@ def free_disturbance(
 ) -> Estimate:
     """Return the model with the disturbance of `placed_effect` free and its parameters fitted.
 
-    It has the effects of the base; a disturbance that the model set lacks is added. The other
-    disturbances stay at `ORDINARY_LEVEL` (0.1 units), with None all of them; the free level is the
-    best of `WIDE_LEVELS` and `INITIAL_LEVEL`, then of `NEAR_LEVELS`. The fit starts from the better
-    one of the parameters of the base and the declared ones, because the fit of a deficient base may
-    be far off, and takes at most `MAX_ITERATIONS` (3) steps. It is stored in the fit cache. The
-    cost is infinite if the model diverges.
+    Other disturbances (with None all) stay at `ORDINARY_LEVEL`; the level is the best of
+    `WIDE_LEVELS` and `INITIAL_LEVEL`, then of `NEAR_LEVELS`. The fit starts from the better of base
+    and declared parameters, takes at most `MAX_ITERATIONS` (3) steps and is cached. The cost is
+    infinite if it diverges.
     """
     known = placed_effect is None or any(
         placed_effect.id == other.id for other in model_set.disturbances
@@ -83,11 +81,7 @@ def scan_level(
     name: str | None,
     levels: Sequence[float],
 ) -> Estimate:
-    """Return the estimate with the best level of one disturbance among `levels`, parameters fixed.
-
-    `levels` are in units of the disturbance. The given estimate is one of the choices and stays at
-    equal cost; it is returned for `name` None.
-    """
+    """Return the estimate with the best level [units] of one disturbance, parameters fixed."""
     if name is None:
         return estimate
     best = estimate
@@ -103,9 +97,6 @@ def scan_level(
 def with_disturbance_levels(
     noise_levels: NoiseLevels, units: Mapping[str, float], levels: Mapping[str, float]
 ) -> NoiseLevels:
-    """Return noise levels with the disturbances in `levels` set to their level times their unit.
-
-    All others stay. KeyError for a name without a unit.
-    """
+    """Return noise levels in which `levels` are multiples of `units`; others stay."""
     sizes = {name: level * units[name] for name, level in levels.items()}
     return dataclasses.replace(noise_levels, process={**noise_levels.process, **sizes})

@@ -28,10 +28,7 @@ MAX_WINDOWS = 12
 
 @dataclass(frozen=True)
 class DisturbanceEstimate:
-    """A torque, force or error in one recording after its burn-in, with standard deviations [SI].
-
-    `values` and `stds` have the shape (samples,).
-    """
+    """A disturbance after the burn-in of a recording with its deviations [SI], (samples,)."""
 
     values: Reals
     stds: Reals
@@ -44,14 +41,11 @@ class DisturbanceEstimate:
 
 @dataclass(frozen=True)
 class Location:
-    """A place with a free disturbance.
+    """A place with a free disturbance of size `rms` [SI]; `gain` [nats] is that of freeing it.
 
-    `gain` is its log-likelihood gain [nats], `rms` the size of the disturbance [SI] and `fraction`
-    that size relative to what acts there. `modes` gives the share of its squares in each mode,
-    `correlates` the quantities with which it correlates. `is_accepted` marks the place of an
-    accepted effect. `free_model` is the fit with this disturbance, whose state is
-    `disturbance_state`. For reported places the smoothed `disturbances` of each recording are
-    known, with their significant `windows` (start, end, recording).
+    `fraction` is the size relative to what acts there, `modes` the share of its squares in each
+    mode. `free_model` is the fit with `disturbance_state`. For reported places the smoothed
+    `disturbances` are known, with their significant `windows` (start, end, recording).
     """
 
     section: str
@@ -78,10 +72,7 @@ class Location:
 def location_of(
     model_set: ModelSet, section: str, placed_effect: PlacedEffect, free_model: Estimate
 ) -> Location:
-    """Return the location of a fit with a free disturbance, from filtered (not smoothed) values.
-
-    The gain is 0 until it is set; windows and `disturbances` are empty.
-    """
+    """Return the location of a fit from filtered values, with gain 0 and without windows."""
     drifts = disturbances_of(
         model_set.series, free_model, placed_effect.qualified_name(DISTURBANCE_STATE)
     )
@@ -100,10 +91,9 @@ def location_of(
 
 
 def with_smoothed_disturbances(model_set: ModelSet, location: Location) -> Location:
-    """Return a location with the smoothed disturbance over time and the values that follow from it.
+    """Return a location with its smoothed disturbance, if it is free and not smoothed yet.
 
-    These are those of `with_disturbances`. A location without a free model, or with known
-    disturbances, is returned unchanged. Raises ValueError if the model is unstable in every mode.
+    Raises ValueError if the model is unstable in every mode.
     """
     if location.free_model is None or location.disturbances:
         return location
@@ -122,12 +112,10 @@ def with_smoothed_disturbances(model_set: ModelSet, location: Location) -> Locat
 def with_disturbances(
     model_set: ModelSet, location: Location, disturbances: tuple[DisturbanceEstimate, ...]
 ) -> Location:
-    """Return a location with a disturbance over time, and the values that follow from it.
+    """Return a location with a disturbance over time, and rms, windows and others that follow.
 
-    These are rms, fraction, windows, modes and correlates. The windows are the longest ones first,
-    at most `MAX_WINDOWS` (12): samples beyond `SIGNIFICANT_STDS` nearer than `WINDOW_DISTANCE`
-    (0.2 s) are merged, and windows shorter than half of it are dropped. The location must have a
-    free model.
+    Significant samples nearer than `WINDOW_DISTANCE` are one window; those shorter than half of it
+    are dropped.
     """
     assert location.free_model is not None
     values = [one.values for one in disturbances]
@@ -164,10 +152,7 @@ def _rms(values: Sequence[Reals]) -> float:
 def disturbances_of(
     series: Sequence[SampledRecording], free_model: Estimate, name: str
 ) -> list[Reals]:
-    """Return the filtered disturbance state `name` [SI] in each recording, (samples,) each.
-
-    The burn-in and the samples after a run diverged are left out.
-    """
+    """Return the filtered state `name` [SI] of each recording after its burn-in, (samples,)."""
     place = free_model.candidate.predictor.states.index(name)
     runs = zip(series, free_model.prediction.predictions, strict=True)
     return [run.states[burn_in_samples(one) : run.completed, place] for one, run in runs]

@@ -80,12 +80,7 @@ class Candidate:
         return np.array(ranges, dtype=np.float64).reshape(-1, 2)
 
     def calibration_page(self, values: Mapping[str, float], series: SampledRecording) -> Reals:
-        """Return the calibration page (tunables,) for one recording.
-
-        It holds `values` [SI] by name, the defaults of other tunables, and the initial values of
-        compared states from the first measurements of the recording. Names that are no tunables are
-        ignored.
-        """
+        """Return the calibration page (tunables,) of `values` [SI] for one recording."""
         return np.asarray(
             self.calibration_pages([values], series.first_measured[np.newaxis])[0], dtype=np.float64
         )
@@ -93,11 +88,10 @@ class Candidate:
     def calibration_pages(
         self, values: Sequence[Mapping[str, float]], first_measured: Reals
     ) -> Reals:
-        """Return the calibration pages (recordings, tunables) of the values [SI] of recordings.
+        """Return the calibration pages (recordings, tunables) of values [SI] of recordings.
 
-        Other tunables have their defaults; names that are no tunables are ignored. `first_measured`
-        (recordings, outputs) gives the initial values of compared states; a NaN keeps the value of
-        the page. Values that are the same object for all recordings are converted once.
+        Other tunables have their defaults. `first_measured` (recordings, outputs) gives the initial
+        values of compared states; a NaN keeps the value of the page.
         """
         is_shared = all(own is values[0] for own in values)
         rows = [
@@ -140,12 +134,10 @@ def compile_candidate(
     output_names: Sequence[str],
     period: Fraction,
 ) -> Candidate:
-    """Return the base with placed effects and disturbances, compiled for a sample period [s].
+    """Return the base with effects and disturbances, compiled for a sample period [s].
 
-    A compiled model with the same sources is read from the compile cache, otherwise it is built and
-    stored there. The names that `placed_effects` add get the wide prior of effects; `disturbances`
-    add disturbance states. Initial values of states among `output_names` become tunable. Raises
-    SpecError, and MissingToolError or BuildError if no C compiler works.
+    Initial values of states among `output_names` become tunable. Raises SpecError, and
+    MissingToolError or BuildError if no C compiler works.
     """
     all_layers = [*placed_effects, *disturbances]
     parts = [
@@ -214,7 +206,7 @@ def _delay_parameters(automaton: Automaton) -> tuple[str, ...]:
 
 
 def _with_tunable_initial_values(automaton: Automaton, output_names: Sequence[str]) -> Automaton:
-    """Return an automaton in which the initial value of each compared state is a new parameter.
+    """Return an automaton in which initial values of compared states are parameters.
 
     This includes outputs that an effect alters: the state still starts near the measured value.
     """

@@ -20,8 +20,7 @@ from language.text.document import Document
 def load_effects(folder: Path) -> tuple[Effect, ...]:
     """Return the effects of the `*.yaml` files directly in a folder, sorted by file name.
 
-    Raises ValueError if there is none (or no folder), and SpecError if a file is invalid or two
-    effects have the same name.
+    Raises ValueError without any, and SpecError for an invalid file or a name that is there twice.
     """
     effects = read_effects(folder)
     if not effects:
@@ -39,11 +38,7 @@ def load_effects(folder: Path) -> tuple[Effect, ...]:
 def explain_unplaceable(
     effects: Sequence[Effect], document: Document, project: Project
 ) -> Iterator[str]:
-    """Yield a message for each effect that cannot be placed anywhere on an expanded automaton.
-
-    It is "effect `name` is not tried: ..." with the first error at the first matching place, or "it
-    fits no place of `automaton`". An effect that is valid at one place at least gives no message.
-    """
+    """Yield why each effect cannot be placed, for those that are valid at no place."""
     for effect in effects:
         placed_effects = find_placements(document, effect)
         errors = [_placement_error(one, document, project) for one in placed_effects]

@@ -19,10 +19,7 @@ HEADER_KEYS = ("language", "effect", "about", "at", *DESCRIPTION_KEYS)
 
 @dataclass(frozen=True)
 class EffectDescription:
-    """An effect with its defining lines and the places of a spec where it can be applied.
-
-    `changes` gives, by the name of each place, the lines of the spec that the effect changes there.
-    """
+    """An effect, its defining lines, its places in a spec and the `changes` at each of them."""
 
     effect: Effect
     lines: tuple[str, ...] = field(repr=False)
@@ -36,10 +33,7 @@ class EffectDescription:
 
 
 def library_effects(project: Project) -> tuple[Effect, ...]:
-    """Return the effects of a project and the shipped ones, sorted by name.
-
-    Raises SpecError with the problems of all files if one is invalid.
-    """
+    """Return all effects of a project by name; SpecError with the problems of all files."""
     span = Span(Source("effects"), 1, 1)
     problems = Problems()
     found = [
@@ -53,11 +47,7 @@ def library_effects(project: Project) -> tuple[Effect, ...]:
 def describe_effect(
     effect: Effect, document: Document | None = None, project: Project | None = None
 ) -> EffectDescription:
-    """Return the description of an effect, with its places if an expanded document is given.
-
-    Places at which the resulting automaton would be invalid are left out. Places and changes are
-    empty unless both `document` and `project` are given.
-    """
+    """Return the description of an effect, with its valid places in a given document."""
     if document is None or project is None:
         return EffectDescription(effect, _defining_lines(effect.body))
     fits = find_placements(document, effect)
@@ -72,10 +62,7 @@ def describe_effect(
 
 
 def _is_placeable(document: Document, project: Project, placed_effect: PlacedEffect) -> bool:
-    """Return whether the automaton with the effect at this place is valid.
-
-    A place can match by structure only: the balance of a sensor filter looks like one of a speed.
-    """
+    """Return whether the automaton with the effect is valid; a place matches by structure only."""
     try:
         automaton_with_effects(document, project, (placed_effect,))
     except SpecError:
@@ -96,10 +83,7 @@ def _defining_lines(body: MappingNode) -> tuple[str, ...]:
 
 
 def format_place_kinds(effect: Effect) -> str:
-    """Return in words the kinds of place to which an effect applies, joined by ", or ".
-
-    An example is "the balance of a speed in N*m, or an elastic element that has gap".
-    """
+    """Return in words the kinds of place to which an effect applies, joined by ", or "."""
     return ", or ".join(_format_place_kind(fit) for fit in effect.place_patterns)
 
 

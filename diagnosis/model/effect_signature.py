@@ -42,11 +42,7 @@ BLUE, RED, *_ = PALETTE
 
 @dataclass(frozen=True)
 class Signature:
-    """Simulations of a base without and with an effect.
-
-    `step` is the stepped input with its height, and `values` are the parameters of the effect as
-    text with units, by their names in the effect.
-    """
+    """Simulations of a base without and with an effect, its parameters as text and the step."""
 
     placed_effect: PlacedEffect
     step: str
@@ -63,12 +59,8 @@ def simulate_signature(
 ) -> Signature:
     """Return the simulations of an expanded base with and without an effect, over `HORIZON` (4 s).
 
-    `step` is an input and its height with unit; by default the input of the effect's place, or the
-    first input without a default, or the first one, by `DEFAULT_STEP_HEIGHTS`. The input steps to
-    the negative height at 1 s and back at 2.5 s; inputs without a default are 0. The magnitudes of
-    the place are those of the step and of the base. A parameter of the effect whose value is
-    neutral takes the last start value of a fit. Raises SpecError, and
-    ValueError if the base has no input or not that of `step`.
+    `step` is an input and its height with unit (`_default_step`). It steps to the negative height
+    at 1 s and back at 2.5 s. Raises SpecError, and ValueError if the base has no such input.
     """
     base = automaton_with_effects(document, project, ())
     name, height = step or _default_step(base, placed_effect)
@@ -106,8 +98,9 @@ def _place_scales(
 
 
 def _default_step(base: Automaton, placed_effect: PlacedEffect) -> tuple[str, str]:
-    """Return the input to step and its height: the place of the effect if that is an input, else
-    the first input without a default, else the first input. Raises ValueError without inputs.
+    """Return the input to step and its height; ValueError without inputs.
+
+    It is the place of the effect, else the first input without a default, else the first one.
     """
     if not base.inputs:
         raise ValueError(f"`{base.name}` has no input to step")
@@ -124,11 +117,7 @@ def _default_step(base: Automaton, placed_effect: PlacedEffect) -> tuple[str, st
 def _with_visible_effect(
     whole: Automaton, placed_effect: PlacedEffect
 ) -> tuple[Automaton, dict[str, str]]:
-    """Return the automaton with the effect's parameters away from their neutral values, and these
-    values.
-
-    A parameter whose declared value is neutral takes the last start value of a fit.
-    """
+    """Return the automaton and values of the effect's parameters, none of them neutral."""
     brought = effect_names(placed_effect)
     parameters, values = dict(whole.parameters), dict[str, str]()
     for one in free_parameters_of(whole, list(brought)):
@@ -164,11 +153,7 @@ def _simulate(automaton: Automaton, project: Project, text: str) -> Trajectory:
 
 
 def draw_signature(signature: Signature) -> Picture:
-    """Draw both simulations for the first `MAX_OUTPUTS` (4) signals that are no modes, over time.
-
-    Below each plot is the difference, with minus without the effect. The title gives the effect and
-    place, its parameters and the step.
-    """
+    """Draw both simulations of the first `MAX_OUTPUTS` (4) signals with their difference below."""
     names = [
         name
         for name in signature.without_effect.signals

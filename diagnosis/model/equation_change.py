@@ -36,9 +36,7 @@ def equation_changes(
 ) -> list[EquationChange]:
     """Return the lines of an expanded document that placed effects change, before and after.
 
-    Only lines of `EQUATION_SECTIONS` are included, not those that end with a unit, a description, a
-    range or an initial value. Raises SpecError if the effects cannot be applied; the result is not
-    checked otherwise.
+    Raises SpecError if the effects cannot be applied.
     """
     found = diff_specs(document.root, overlay_effects(document, placed_effects).root)
     return [

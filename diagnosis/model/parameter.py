@@ -31,9 +31,7 @@ EFFECT_PRIOR_STD = 0.5
 class FreeParameter:
     """A parameter [SI] with a coordinate z: value = start exp(sd z) if `is_log`, else start + sd z.
 
-    sd is `prior_std`. `low` and `high` are its range, `starts` the values from which fits begin.
-    With `per_recording` each recording has a value of its own. `is_order` marks a number of periods
-    over the path of an effect.
+    sd is `prior_std`; fits begin at `starts`. `is_order` marks a number of periods over a path.
     """
 
     name: str
@@ -54,10 +52,7 @@ class FreeParameter:
         return self.start + self.prior_std * z
 
     def coordinate(self, value: float) -> float:
-        """Return the coordinate of a value [SI], 0 for `start`; it may be outside the bounds.
-
-        Raises ValueError for a value that is not positive if `is_log` (and the start is positive).
-        """
+        """Return the coordinate of a value [SI]; ValueError for the logarithm of a negative one."""
         if self.is_log:
             return math.log(value / self.start) / self.prior_std
         return (value - self.start) / self.prior_std
@@ -73,10 +68,7 @@ def free_parameters_of(
 ) -> tuple[FreeParameter, ...]:
     """Return the real scalar parameters of an automaton with a range and a value, in its order.
 
-    `effects` names the parameters that effects add. Their prior is `EFFECT_PRIOR_STD` of the range,
-    and they have start values; that of others is `PRIOR_STD`. A coordinate is logarithmic if value
-    and range are positive; a lower bound of 0 of a positive base parameter becomes 0.1 % of its
-    value.
+    `effects` names the parameters that effects add, which have a wide prior and start values.
     """
     found = []
     for name, parameter in automaton.parameters.items():
@@ -89,10 +81,7 @@ def free_parameters_of(
 
 
 def _base_parameter(parameter: Parameter) -> FreeParameter:
-    """Return a base parameter as a free one: logarithmic if its range and value are positive.
-
-    A lower bound of 0 of a positive parameter becomes 0.1 % of its value.
-    """
+    """Return a base parameter as a free one; a lower bound of 0 becomes 0.1 % of its value."""
     assert parameter.range and parameter.value is not None
     low, high = (float(end) for end in parameter.range)
     value, unit = float(parameter.value), si_unit(parameter)
@@ -121,11 +110,7 @@ def _effect_parameter(parameter: Parameter) -> FreeParameter:
 
 
 def _start_values(parameter: Parameter, value: float) -> tuple[float, ...]:
-    """Return the values from which fits of an effect parameter start.
-
-    These are the declared starts; else, with a neutral value, one point near it and one at a tenth
-    of the way to the upper bound; else the declared value.
-    """
+    """Return the declared starts; else two points away from the neutral value; else the value."""
     fitting = parameter.fitting
     if fitting.starts:
         return tuple(float(start) for start in fitting.starts)
@@ -144,10 +129,7 @@ def si_unit(parameter: Parameter) -> str:
 
 
 def declared_value(automaton: Automaton, text: str) -> float | None:
-    """Return the value [SI] of a formula of numbers and parameters, as they are declared.
-
-    None for an empty text and for another formula.
-    """
+    """Return the value [SI] of a formula of numbers and declared parameters, else None."""
     if not text:
         return None
     scalar = ScalarNode(text, automaton.span)

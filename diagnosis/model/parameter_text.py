@@ -9,11 +9,7 @@ from language.model.declaration import Parameter
 
 
 def format_value(value: float, parameter: Parameter) -> str:
-    """Return a value [SI] with six significant digits and its SI unit, such as `0.12 kg*m^2`.
-
-    If the rounded value is outside the range of the parameter, the value is clipped to the range
-    and written in full. Without a unit the text is the number alone.
-    """
+    """Return a value [SI] as `0.12 kg*m^2`, with six digits unless these are outside its range."""
     text = f"{value:.6g}"
     if parameter.range:
         low, high = parameter.range

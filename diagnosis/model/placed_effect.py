@@ -91,11 +91,7 @@ class PlacedEffect:
 
 
 def read_effects(folder: Path) -> tuple[Effect, ...]:
-    """Return the effects in the files `*.yaml` directly in a folder, sorted by file name.
-
-    Empty if there is no such file. Raises SpecError, with the problems of all files that can be
-    parsed.
-    """
+    """Return the effects in the files `*.yaml` directly in a folder, sorted; may raise SpecError."""
     problems = Problems()
     found = [read_effect(read_document(path), problems) for path in sorted(folder.glob("*.yaml"))]
     problems.raise_if_errors()
@@ -103,30 +99,18 @@ def read_effects(folder: Path) -> tuple[Effect, ...]:
 
 
 def shipped_effects() -> tuple[Effect, ...]:
-    """Return the effects of the shipped library, sorted by file name.
-
-    The files are read at each call.
-    """
+    """Return the effects of the shipped library, sorted by file name."""
     return read_effects(Path(str(resources.files("spec"))) / "effects")
 
 
 def disturbance_effect(kind: str, place: str) -> PlacedEffect:
-    """Return the disturbance at a place; `kind` is "balance", "element" or "output".
-
-    The effect is read from `drift_of_<kind>.yaml`; its suffix is `<kind>_<place>`. Whether the
-    place exists is not checked.
-    """
+    """Return the disturbance at a place; `kind` is "balance", "element" or "output"."""
     path = Path(str(resources.files("diagnosis.model"))) / "disturbances" / f"drift_of_{kind}.yaml"
     return PlacedEffect(read_effect(read_document(path), Problems()), place, f"{kind}_{place}")
 
 
 def find_placements(document: Document, effect: Effect) -> tuple[PlacedEffect, ...]:
-    """Return an effect at every place of an expanded automaton that matches it.
-
-    Candidates are the names in the sections flow, inputs, elements and outputs of the kinds of the
-    effect, in the order in which these sections first name them. The suffix is the name of the
-    place. Whether the automaton with the effect is valid is not checked.
-    """
+    """Return an effect at every place of an expanded automaton that matches its patterns."""
     root, kinds = document.root, {fit.kind for fit in effect.place_patterns}
     names = [
         name
@@ -137,11 +121,7 @@ def find_placements(document: Document, effect: Effect) -> tuple[PlacedEffect, .
 
 
 def overlay_effects(document: Document, placed_effects: Sequence[PlacedEffect]) -> Document:
-    """Return an expanded document with effects applied in the given order.
-
-    Raises SpecError at the first effect that cannot be applied; the result is not checked as an
-    automaton. `document` is not changed.
-    """
+    """Return an expanded document with effects applied in order; SpecError if one cannot be."""
     problems = Problems()
     root = document.root
     span = Span(Source("diagnosis"), 1, 1)
@@ -163,10 +143,7 @@ def overlay_effects(document: Document, placed_effects: Sequence[PlacedEffect]) 
 def automaton_with_effects(
     document: Document, project: Project, placed_effects: Sequence[PlacedEffect]
 ) -> Automaton:
-    """Return the checked automaton of an expanded document with effects applied in the given order.
-
-    Raises SpecError if an effect cannot be applied or the result is invalid.
-    """
+    """Return the automaton of a document with effects; SpecError if that is invalid."""
     return automaton_of(overlay_effects(document, placed_effects), project)
 
 
@@ -179,11 +156,10 @@ def lower_tunable_program(
 ) -> tuple[Program, int]:
     """Return the Program in which `names` are tunable, and the major steps in a period [s].
 
-    The step divides the period into at least `min_substeps` and at most `MAX_STEPS` (40) parts and
-    is at most `MAX_STEP` (5 ms) or the period. It is at most the `time_resolution` at the declared
-    parameters and with those of `effect_parameters` at a quarter and four times their values
-    (within their ranges), and not longer than any nonzero time among these: the eigenvalue of a
-    limited rate is not known beforehand.
+    The step divides the period into `min_substeps` to `MAX_STEPS` (40) parts. It is at most
+    `MAX_STEP` or the period, and the `time_resolution` with `effect_parameters` at a quarter and
+    four times their values, and any nonzero time among these: the eigenvalue of a limited rate is
+    not known beforehand.
     """
     scaled = [
         _scale_parameters(automaton, effect_parameters, factor)
@@ -220,9 +196,9 @@ def minimum_substeps(
 ) -> int:
     """Return the fewest major steps in a sample period [s] for a model with effects.
 
-    For an effect at an input and a model that calls `floor` (an angle) the steps are at most
-    `MAX_ANGLE_STEP` (1 ms) long. Otherwise it is `MIN_DELAY_STEPS` (4) for a model with a delay or
-    with direct feed-through to a compared output (an output is constant within a step), else 1.
+    Steps are at most `MAX_ANGLE_STEP` (1 ms) for an effect at an input that depends on an angle;
+    there are `MIN_DELAY_STEPS` (4) with a delay or direct feed-through (an output is constant
+    within a step).
     """
     at_input = any(
         placed_effect.effect.place_patterns[0].kind == "input" for placed_effect in placed_effects
@@ -248,9 +224,7 @@ def _scale_parameters(automaton: Automaton, names: Sequence[str], factor: Fracti
 
 
 def _place_kinds(document: Document) -> dict[str, set[str]]:
-    """Return the names in a document to which effects could apply,
-    with the possible kinds of place.
-    """
+    """Return the possible kinds of place of each name in a document."""
     found: dict[str, set[str]] = {}
     for section, kind in PLACE_KIND_BY_SECTION.items():
         node = document.root.get(section)
@@ -272,10 +246,7 @@ SECTION_BY_PLACE_KIND = {
 
 
 def place_path(placed_effect: PlacedEffect) -> str:
-    """Return `section.name` of the place of an effect, by the kind of its first place pattern.
-
-    The section is flow, inputs, outputs or elements.
-    """
+    """Return `section.name` of the place of an effect, by its first place pattern."""
     kind = placed_effect.effect.place_patterns[0].kind
     return f"{SECTION_BY_PLACE_KIND[kind]}.{placed_effect.place}"
 

@@ -34,11 +34,7 @@ BLUE, RED, GREEN, _, _, PURPLE, GREY = PALETTE
 
 
 def draw_locations(locations: Sequence[Location]) -> Picture:
-    """Draw a bar with its gain [nats] for each location, the largest one on top and in blue.
-
-    A negative gain is drawn as 0, an infinite gain (the base diverges) beyond the others; a gain of
-    NaN is left out.
-    """
+    """Draw a bar with its gain [nats], at least 0, for each location, the largest one in blue."""
     known = [location for location in locations if not math.isnan(location.gain)]
     shown = sorted(known, key=lambda location: location.gain)
     figure = Figure(figsize=(7.0, 0.9 + 0.38 * max(1, len(shown))), layout="constrained")
@@ -70,11 +66,9 @@ def draw_disturbance(
     unit: str,
     inputs: Mapping[str, str],
 ) -> Picture:
-    """Draw a disturbance in one recording with its band of three standard deviations.
+    """Draw a disturbance with its band and windows, above up to three varying inputs of one unit.
 
-    The windows of the location in this recording are shaded. Below are up to `MAX_INPUTS` (3)
-    varying inputs, those in the unit of the first one, if there are any; `inputs` are all inputs
-    with their units, in the order of the recording's columns. `title` and `unit` label the axis.
+    `inputs` are all inputs with their units; `title` and `unit` label the disturbance.
     """
     values, reach = disturbance.values, SIGNIFICANT_STDS * disturbance.stds
     first = series.count - len(values)
@@ -113,10 +107,9 @@ def draw_disturbance(
 def draw_experiment(
     plan: ExperimentPlan, inputs: Mapping[str, str], signals: Sequence[tuple[str, str]]
 ) -> Picture:
-    """Draw the first manoeuvre of a plan: varying inputs on top, one plot for each output below.
+    """Draw the first manoeuvre of a plan, and each output as each candidate simulates it.
 
-    Each output is drawn as each candidate simulates it. `inputs` and `signals` give names with
-    units, in the order of the columns. The plan must have a manoeuvre.
+    `inputs` and `signals` give names with units, in the order of the columns.
     """
     best = plan.options[0]
     series = best.manoeuvre.series
@@ -163,11 +156,7 @@ OSCILLATION_LABELS = ("simulated, recalibrated", "simulated, with what was found
 
 
 def draw_oscillation(oscillations: Sequence[Oscillation], unit: str) -> Picture:
-    """Draw frequency over amplitude of the cycles, recorded and simulated by one or two models.
-
-    The recorded cycles are those of the first oscillation; the labels are `OSCILLATION_LABELS`.
-    `unit` is that of the amplitude.
-    """
+    """Draw frequency over amplitude [unit] of the cycles, recorded and by one or two models."""
     figure = Figure(figsize=(7.0, 3.2), layout="constrained")
     axis = figure.subplots()
     first = oscillations[0]
@@ -196,11 +185,7 @@ def draw_oscillation(oscillations: Sequence[Oscillation], unit: str) -> Picture:
 def draw_whiteness(
     before: Sequence[WhitenessTest], after: Sequence[WhitenessTest], is_base_only: bool
 ) -> Picture:
-    """Draw the autocorrelations of innovations by lag [ms], with the 99 % band, a plot per signal.
-
-    `before` is the base, `after` the final model. With `is_base_only` no effect was accepted, so
-    only the base is drawn.
-    """
+    """Draw the autocorrelations of innovations by lag [ms], with the 99 % band, a plot per signal."""
     figure = Figure(figsize=(8.5, 2.7), layout="constrained")
     axes = figure.subplots(1, len(before), squeeze=False, sharey=True)[0]
     for axis, old, new in zip(axes, before, after, strict=True):
@@ -243,12 +228,9 @@ class ReportFigure:
 def report_figures(
     report: DiagnosisReport, comparisons: Sequence[ModelComparison]
 ) -> list[ReportFigure]:
-    """Return the figures of a report: windows, whiteness, places, disturbance, oscillation, plan.
+    """Return the figures of a report that have content: windows, whiteness, places, and others.
 
-    There is a worst window for each of `comparisons`; whiteness is of the first one. Figures
-    without content are left out: places without a gain, a disturbance without a significant window,
-    an oscillation that the base follows, a plan that does not discriminate. The report must have a
-    diagnosis.
+    The report must have a diagnosis; whiteness is that of the first comparison.
     """
     assert report.diagnosis
     is_same = not report.diagnosis.selection.accepted
@@ -272,12 +254,7 @@ def report_figures(
 
 
 def window_caption(window: WorstWindow, is_base_only: bool) -> str:
-    """Return the caption of a window with the largest error of each signal in free simulation.
-
-    It is "<Title>. Left alone the model misses w by up to 1.2 rad/s without, 0.30 rad/s with;
-    ...."; with `is_base_only` only the error of the base. The error is `-` for a signal without
-    values.
-    """
+    """Return the title of a window and the largest error of each signal in free simulation."""
     alone = window.times >= window.free_from
     texts = []
     for k, (name, unit) in enumerate(zip(window.signals, window.units, strict=True)):
@@ -338,11 +315,7 @@ def _location_figure(report: DiagnosisReport) -> ReportFigure:
 
 
 def _disturbance_figure(report: DiagnosisReport, inputs: Mapping[str, str]) -> list[ReportFigure]:
-    """Return the figure of the disturbance at the first location, in the recording of its longest
-    window.
-
-    The list is empty if nothing is missing or there is no significant window.
-    """
+    """Return the figure of the first location's longest window in a list; empty without one."""
     best = report.verdict.location[0]
     if report.diagnosis is None or report.verdict.verdict == "nothing_missing":
         return []
@@ -366,11 +339,7 @@ def _disturbance_figure(report: DiagnosisReport, inputs: Mapping[str, str]) -> l
 
 
 def embed_svg(figure: ReportFigure, data: bytes) -> str:
-    """Return an SVG file as an element of a page, with the figure's alternative text as label.
-
-    All before the first `<svg ` and the metadata are removed; identifiers and references to them
-    get the prefix `<figure name>-`, so that figures of a page do not share any.
-    """
+    """Return an SVG as an element of a page; the figure's name makes its identifiers unique."""
     label = html.escape(figure.alternative_text, quote=True)
     text = SVG_IDENTIFIER.sub(rf"\g<1>{figure.name}-", METADATA.sub("", data.decode()))
     return SVG_HEAD.sub(f'<svg role="img" aria-label="{label}" ', text, count=1)

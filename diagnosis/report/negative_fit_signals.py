@@ -13,11 +13,7 @@ CONSTANT_MODEL_NRMSE = 1.0
 
 
 def unfollowed_signals(verdict: Verdict) -> Iterator[str]:
-    """Yield a message for each signal whose final misfit exceeds that of a constant, or is NaN.
-
-    The misfit of a constant is `CONSTANT_MODEL_NRMSE` (1). Each set of recordings (train, held out)
-    is considered by itself, in the order of the verdict.
-    """
+    """Yield a message for each signal whose misfit is NaN or above `CONSTANT_MODEL_NRMSE`."""
     for part, signals in verdict.fit.items():
         for name, misfit in signals.items():
             share = misfit.nrmse_after
@@ -27,10 +23,7 @@ def unfollowed_signals(verdict: Verdict) -> Iterator[str]:
 
 
 def withdraw_nothing_missing(verdict: Verdict, unfollowed: Sequence[str]) -> Verdict:
-    """Return the verdict, with `nothing_missing` changed to `unknown` if signals are not followed.
-
-    Another verdict, or one without `unfollowed` messages, is returned itself.
-    """
+    """Return the verdict, `unknown` for `nothing_missing` with `unfollowed` signals."""
     if unfollowed and verdict.verdict == "nothing_missing":
         return dataclasses.replace(verdict, verdict="unknown")
     return verdict

@@ -19,9 +19,7 @@ and how many are named.
 
 @dataclass(frozen=True)
 class ParameterRow:
-    """A parameter with its values as texts, its change from the declared value,
-    and its description.
-    """
+    """A parameter, its values and its change from the declared value, as texts."""
 
     name: str
     unit: str
@@ -34,12 +32,7 @@ class ParameterRow:
 
 
 def parameter_rows(report: DiagnosisReport, selection: Selection) -> list[ParameterRow]:
-    """Return a row for each parameter of the final model: declared, recalibrated and final value.
-
-    The order is that of the model. A parameter of an effect has `new` as declared value and "" for
-    recalibrated value and change. Values have standard deviations; the description is that of the
-    spec, else of the effect; the note is that of `parameter_note`.
-    """
+    """Return declared, recalibrated and final value of each parameter of the final model."""
     before, after = quantities_of(selection.base), quantities_of(selection.model)
     effect_abouts = {
         placed_effect.qualified_name(own): entry.text_of("about")
@@ -74,12 +67,7 @@ def _parameter_tables(body: MappingNode) -> list[tuple[str, MappingNode]]:
 
 
 def format_biased_parameters(selection: Selection) -> str:
-    """Return how far the recalibration without effects moves parameters from their final values.
-
-    It is `name +12 %, ...`, the largest change first, at most `MAX_BIASED` (5). A parameter is
-    biased from a change of `MIN_BIAS` (3 %) and `MIN_BIAS_STDS` (3) standard deviations on; only
-    positive values count. The text is "" if none is biased.
-    """
+    """Return `name +12 %, ...`: how far the fit without effects moves parameters."""
     before, after = quantities_of(selection.base), quantities_of(selection.model)
     found = []
     for name, one in before.items():
@@ -105,11 +93,7 @@ def about_of(report: DiagnosisReport, section: str, name: str) -> str:
 
 
 def format_fixed_parameters(report: DiagnosisReport) -> list[str]:
-    """Return `name = value` of each real parameter without a range: these are taken as exact.
-
-    Values are in SI with five significant digits, without unit, in the order of the automaton;
-    parameters without a value (tables) are left out.
-    """
+    """Return `name = value` [SI] of each real parameter without a range."""
     return [
         f"{name} = {float(one.value):.5g}"
         for name, one in report.automaton.parameters.items()

@@ -46,11 +46,7 @@ DIGEST_LENGTH = 16
 
 
 def provenance_rows(report: DiagnosisReport) -> list[tuple[str, str, str]]:
-    """Return use, name and digest of spec, map, effects and each recording, in this order.
-
-    Training recordings come before held-out ones. A digest has `DIGEST_LENGTH` (16) hexadecimal
-    digits of SHA-256; that of a map without a file is "".
-    """
+    """Return use, name and digest of spec, map, effects and each recording."""
     case = report.case
     effects = case.effects if case.effects is not None else shipped_effects()
     library = "\n".join(f"{one.name} {node_text(one.body)}" for one in effects)
@@ -75,11 +71,7 @@ def _text_digest(text: str) -> str:
 
 
 def tool_versions() -> str:
-    """Return the versions of modewright, Python, numpy, scipy and the C compiler in one line.
-
-    It is `modewright 1.0, Python 3.11.2, numpy 2.1, scipy 1.14, gcc ...`. The last part is the
-    version line of the C compiler, or `no C compiler` if it cannot be started.
-    """
+    """Return `modewright 1.0, Python 3.11.2, numpy 2.1, scipy 1.14, gcc ...`."""
     try:
         compiler = compiler_version().partition(": ")[2]
     except (BuildError, MissingToolError):
@@ -92,10 +84,7 @@ def tool_versions() -> str:
 def report_files(report: DiagnosisReport, variant: str, folder: Path = Path()) -> dict[str, bytes]:
     """Return the contents of all files of a diagnosis by name; `verdict.json` is the last one.
 
-    `variant.yaml`, `report.html` and `verdict.json` are always there; with a diagnosis also
-    `<figure>.svg` and `.png`, `window.csv`, `scenario.yaml`, and the file of a discovered formula.
-    `variant` is the text of the variant file, `folder` the folder that commands on the page name.
-    Nothing is written.
+    `variant` is the text of the variant file, `folder` the one that commands on the page name.
     """
     comparisons = compare_models(report)
     figures = report_figures(report, comparisons) if comparisons else []

@@ -22,12 +22,7 @@ MAX_NAMED = 4
 
 
 def format_headline(report: DiagnosisReport) -> str:
-    """Return the verdict in one sentence.
-
-    An early end comes first ("Nothing is concluded yet: ..."), then unusable recordings; else the
-    sentence names the effects with their values, the effects that cannot be told apart, the nearest
-    formula or effects for an unknown cause, or the threshold that no effect reached.
-    """
+    """Return the verdict in one sentence."""
     verdict = report.verdict
     if report.end_reason:
         return f"Nothing is concluded yet: {report.end_reason}."
@@ -67,10 +62,7 @@ def _format_nearest(report: DiagnosisReport) -> str:
 
 
 def format_effect(effect: NamedEffect) -> str:
-    """Return an effect with its place in words, such as `viscous friction in the balance of w`.
-
-    Underscores of the name become spaces; the phrases are `PLACE_PHRASES`.
-    """
+    """Return an effect with its place, such as `viscous friction in the balance of w`."""
     section, _, name = effect.place.partition(".")
     return f"{effect.id.replace('_', ' ')} {PLACE_PHRASES[section]} {name}"
 
@@ -89,19 +81,12 @@ def format_fitted_quantity(fitted: Quantity) -> str:
 
 
 def format_two_digits(value: float) -> str:
-    """Return a number with two significant digits: `100`, not `1e+02`.
-
-    Below 1e-4 and from 1e6 on it has an exponent.
-    """
+    """Return a number with two significant digits: `100`, not `1e+02`."""
     return f"{float(f'{value:.2g}'):g}"
 
 
 def format_improvement(report: DiagnosisReport) -> str:
-    """Return the misfits of free simulation and the confirmation in one line; "" without a misfit.
-
-    It is "misfit of free simulation, train: w 12 % to 5 %; held out: ... - confirmed"; equal
-    misfits are given once, and the end is "", " - confirmed" or " - not confirmed".
-    """
+    """Return the misfits before and after and the confirmation in one line; "" without any."""
     fit = report.verdict.fit
     parts = [
         f"{name.replace('_', ' ')}: {_format_misfits(signals)}"
@@ -124,10 +109,7 @@ def _format_misfits(signals: Mapping[str, Misfit]) -> str:
 
 
 def format_missing_location(report: DiagnosisReport) -> str:
-    """Return where physics is missing in one sentence, by `format_location`.
-
-    It is "" without a diagnosis and for the verdict `nothing_missing`.
-    """
+    """Return where physics is missing by `format_location`; "" if nothing is."""
     found = report.diagnosis
     if found is None or report.verdict.verdict == "nothing_missing":
         return ""
@@ -135,12 +117,7 @@ def format_missing_location(report: DiagnosisReport) -> str:
 
 
 def format_separation(report: DiagnosisReport) -> list[str]:
-    """Return what would separate the accepted effects from those with which they are confused.
-
-    The first line is the experiment, if there is a plan; then `<name> from <others>: <notes>` for
-    each accepted effect and rival whose file has `confused_with` and `separated_by`. Empty without
-    a diagnosis.
-    """
+    """Return the experiment, and notes of effects, that separate accepted effects from others."""
     if report.diagnosis is None:
         return []
     selection = report.diagnosis.selection
@@ -155,12 +132,7 @@ def format_separation(report: DiagnosisReport) -> list[str]:
 
 
 def format_oscillation(report: DiagnosisReport) -> str:
-    """Return how long the models follow the largest step, as a sentence.
-
-    The models are the base and, if effects were accepted, the final one. The text is "" without an
-    analysed step, if nothing is missing, or if the base does not oscillate at another frequency
-    after it stops following.
-    """
+    """Return how long base and model follow the largest step; "" if the base follows."""
     found = report.diagnosis.oscillations if report.diagnosis else ()
     if not found or not found[0].has_other_frequency or report.verdict.verdict == "nothing_missing":
         return ""
@@ -185,11 +157,7 @@ def format_experiment(report: DiagnosisReport) -> str:
 def format_reason(
     candidate_fit: CandidateFit, rank: int, selection: Selection, thresholds: Thresholds
 ) -> str:
-    """Return why a candidate was accepted or not; `rank` is its index in the table.
-
-    The cases in order: accepted, a rival, not fitted, a gain not above its threshold, nothing
-    accepted, and less than (or for `rank` 0 not needed beside) what was accepted.
-    """
+    """Return why a candidate was accepted or not; `rank` is its index in the table."""
     ids = {one.placed_effect.id for one in selection.accepted}
     if candidate_fit.placed_effect.id in ids:
         return "accepted"
@@ -212,12 +180,9 @@ def candidate_title(placed_effect: PlacedEffect, report: DiagnosisReport) -> str
 
 
 def summary_lines(report: DiagnosisReport) -> list[str]:
-    """Return at most four lines that sum up a report.
+    """Return headline, location, experiment or oscillation, improvement and caveat.
 
-    They are headline, location, experiment or oscillation, improvement and caveat. The third is the
-    experiment for the verdict `ambiguous`, else the oscillation; the caveat is the worst finding
-    that is no note, else the effects that are nearly as good. If there are five, the second and the
-    third one are joined by "; ". Empty lines are left out.
+    There are at most four lines; of five, the second and the third one are joined.
     """
     is_ambiguous = report.verdict.verdict == "ambiguous"
     more = format_experiment(report) if is_ambiguous else format_oscillation(report)
@@ -229,9 +194,7 @@ def summary_lines(report: DiagnosisReport) -> list[str]:
 
 
 def _format_caveat(report: DiagnosisReport) -> str:
-    """Return the worst finding on recordings, or effects that are nearly as good;
-    "" without any.
-    """
+    """Return the worst finding on recordings, else effects nearly as good, else an empty text."""
     worst = format_findings([finding for finding in report.findings if finding.severity != "note"])
     if worst:
         more = f" (and {len(worst) - 1} more)" if len(worst) > 1 else ""

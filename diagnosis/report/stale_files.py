@@ -17,11 +17,9 @@ FIGURE_NAMES = (
 
 
 def find_stale_files(folder: Path) -> list[Path]:
-    """Return the existing files of an earlier diagnosis that are not written in every case.
+    """Return the files of an earlier diagnosis in a folder that are not written in every case.
 
-    These are figures (`FIGURE_NAMES`, svg and png), scenario, window, thresholds and formula
-    effects; `verdict.json`, `variant.yaml` and `report.html` are not listed. A folder without a
-    `verdict.json` of the right format has none. All but figures count only if their contents
+    Only a folder with a `verdict.json` has any. All but figures count only if their contents
     identify them; others belong to the user.
     """
     if _json_format(folder / "verdict.json") != VERDICT:

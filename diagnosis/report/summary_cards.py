@@ -28,10 +28,9 @@ class Card:
 def summary_cards(
     report: DiagnosisReport, residual_tests: Sequence[WhitenessTest] = ()
 ) -> list[Card]:
-    """Return the cards on location, confidence, improvement and caveats, in this order.
+    """Return the cards on location, confidence, improvement and caveats that have lines.
 
-    `residual_tests` are whiteness tests of the final model; signals rated `coloured` are a caveat.
-    A card without lines is left out. Without a diagnosis there are no cards.
+    `residual_tests` are those of the final model.
     """
     if report.diagnosis is None:
         return []

@@ -52,8 +52,7 @@ class FitRow:
 def misfit_rows(report: DiagnosisReport, label: str, dataset: str, runs: FreeRuns) -> list[FitRow]:
     """Return the misfits [SI] of each recording of a set, then a sum row of normalised ones.
 
-    `dataset` is the key of the set in the verdict, `label` its name in words. Changes below
-    `CHANGE_TOLERANCE` (2 %) are the trend `same`.
+    `dataset` is the key of the set in the verdict, `label` its name in words.
     """
     rows = []
     for name, before, after in rms_by_recording(runs):
@@ -89,11 +88,7 @@ class CandidateRow:
 
 
 def candidate_rows(report: DiagnosisReport, selection: Selection) -> list[CandidateRow]:
-    """Return the rows of fitted candidates: accepted ones, then the others of the first round.
-
-    Candidates that were only screened are left out. A bar is the penalised gain in per cent of the
-    largest one (at least 1 nat); gains are in nats, `diverges` if not finite.
-    """
+    """Return the rows of fitted candidates: accepted ones, then the others of the first round."""
     ids = {one.placed_effect.id for one in selection.accepted}
     first = [one for one in selection.first_round if one.placed_effect.id not in ids]
     listed = [one for one in (*selection.accepted, *first) if one.is_fitted]
@@ -141,11 +136,7 @@ def _format_nats(gain: float) -> str:
 def unfitted_candidates(
     report: DiagnosisReport, selection: Selection
 ) -> list[tuple[str, list[str]]]:
-    """Return the reasons why candidates were not fitted, each with the names of these candidates.
-
-    The names are `name@section.place`. Only candidates of the first round without a gain count;
-    both orders are those of the first round.
-    """
+    """Return the reasons why candidates of the first round were not fitted, with their names."""
     found: dict[str, list[str]] = {}
     ids = {one.placed_effect.id for one in selection.accepted}
     for tried in selection.first_round:
@@ -156,12 +147,7 @@ def unfitted_candidates(
 
 
 def location_rows(location: Location, max_windows: int = MAX_WINDOWS) -> list[tuple[str, str]]:
-    """Return windows, modes and correlates of a location as pairs of heading and text.
-
-    The headings are "strongest in" (the first `max_windows`, and how many more), "by mode" (shares
-    from 0.5 % on, largest first; only for several modes) and "goes along with" (correlations from
-    `MIN_CORRELATION` 0.3 on). Rows without text are left out.
-    """
+    """Return windows, modes and correlates of a location as pairs of heading and text."""
     modes = sorted(location.modes.items(), key=lambda pair: -pair[1])
     shares = [f"{name} {format_percent(share)}" for name, share in modes if share >= 0.005]
     shares = shares if len(modes) > 1 else []
@@ -182,12 +168,7 @@ def location_rows(location: Location, max_windows: int = MAX_WINDOWS) -> list[tu
 
 
 def recording_rows(report: DiagnosisReport) -> list[tuple[str, ...]]:
-    """Return name, use, length, rate, lost samples and findings of each checked recording.
-
-    The use is `training` or `not used` (for all without a diagnosis). The rate is a range if
-    channels differ (`50-100 Hz`), lost samples are those of the worst channel, and findings are
-    counts of errors and warnings; both are `none` if there are none.
-    """
+    """Return name, use, length, rate, lost samples and findings of each checked recording."""
     check = report.check
     rows: list[tuple[str, ...]] = []
     for name in dict.fromkeys(one.recording for one in check.channels):
@@ -215,10 +196,7 @@ def recording_rows(report: DiagnosisReport) -> list[tuple[str, ...]]:
 
 
 def untestable_effects(report: DiagnosisReport) -> list[tuple[str, str]]:
-    """Return what recordings lack in words, and the effects that need it, joined by ", ".
-
-    Needs of one effect are joined by " and "; effects with the same needs share an entry.
-    """
+    """Return what recordings lack, each with the effects that need it."""
     lacking: dict[str, list[str]] = {}
     for one in report.check.excitation.effects:
         if one.lacking:
@@ -227,10 +205,7 @@ def untestable_effects(report: DiagnosisReport) -> list[tuple[str, str]]:
 
 
 def format_noise(selection: Selection, signals: Sequence[str], units: Sequence[str]) -> str:
-    """Return the noise of the recorded signals in the base: `w 0.12 rad/s, T 3.0 N*m`.
-
-    It has two significant digits; no model can predict below it.
-    """
+    """Return the noise of the recorded signals in the base: `w 0.12 rad/s, T 3.0 N*m`."""
     noise = selection.base.noise_levels.outputs
     parts = zip(signals, noise, units, strict=True)
     return ", ".join(
@@ -239,11 +214,7 @@ def format_noise(selection: Selection, signals: Sequence[str], units: Sequence[s
 
 
 def split_code_spans(text: str) -> list[tuple[str, bool]]:
-    """Return the parts of a sentence between back quotes, with whether each was quoted.
-
-    The parts alternate, beginning with an unquoted one; parts may be "". A last back quote without
-    a partner also begins a quoted part.
-    """
+    """Return the parts of a sentence between back quotes, with whether each was quoted."""
     return [(part, place % 2 == 1) for place, part in enumerate(text.split("`"))]
 
 
@@ -253,11 +224,9 @@ def whiteness_rows(
     units: Sequence[str],
     is_base_only: bool,
 ) -> list[tuple[str, ...]]:
-    """Return a row of texts for each signal and model, the base first.
+    """Return signal, model, rms, predictable fraction, lags outside, p-value and rating.
 
-    It has signal, model (`recalibrated` with `is_base_only`, else `without` and `with`), rms with
-    unit, predictable fraction, lags outside of all lags (`3 of 60`), p-value (`< 0.001` below that)
-    and rating.
+    There is a row for each signal and model, the base first.
     """
     models = [("recalibrated", before)] if is_base_only else [("without", before), ("with", after)]
     rows: list[tuple[str, ...]] = []
@@ -282,11 +251,7 @@ def whiteness_rows(
 def describe_residuals(
     before: Sequence[WhitenessTest], after: Sequence[WhitenessTest], is_base_only: bool
 ) -> list[tuple[str, str]]:
-    """Return for each signal its name and in words what the final model leaves.
-
-    The words give the rating of `after` and its predictable fraction, and that of the base unless
-    `is_base_only`.
-    """
+    """Return each signal with the rating and the predictable fraction of what is left."""
     ratings = {
         "white": "noise",
         "nearly white": "next to nothing but noise",

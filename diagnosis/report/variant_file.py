@@ -29,19 +29,14 @@ MIN_RELATIVE_CHANGE = 1e-6
 
 
 def variant_name(base: str, suffix: str = NAME_SUFFIX) -> str:
-    """Return a base's name with a suffix; the base is cut so that there are at most 31 characters.
-
-    The limit is `MAX_NAME_LENGTH`; the suffix is never cut.
-    """
+    """Return a base's name, cut so that it has `MAX_NAME_LENGTH` (31) characters with a suffix."""
     return base[: MAX_NAME_LENGTH - len(suffix)] + suffix
 
 
 def format_variant(report: DiagnosisReport, extends: str) -> str:
     """Return the variant as YAML text; `extends` is the name or the file of the base.
 
-    It has the parameters that changed by more than `MIN_RELATIVE_CHANGE` and the accepted effects
-    with their fitted values, in SI; standard deviations and declared values are comments, as are
-    `missing_effect_notes`. Without a diagnosis it has only the header and `about`.
+    It has the changed parameters and the accepted effects in SI, with notes as comments.
     """
     lines = [
         "language: 1",
@@ -60,10 +55,7 @@ def format_variant(report: DiagnosisReport, extends: str) -> str:
 
 
 def missing_effect_notes(report: DiagnosisReport) -> list[str]:
-    """Return a sentence for each of `missing_effects`: its file has to be copied below `spec/`.
-
-    They are without `#`. The variant finds these effects by name.
-    """
+    """Return a sentence on each of `missing_effects`, which a variant finds by name."""
     names = [effect.body.span.source.name for effect in missing_effects(report)]
     return [
         f"{name} has to be below spec/: the variant finds this effect by name" for name in names
@@ -71,11 +63,7 @@ def missing_effect_notes(report: DiagnosisReport) -> list[str]:
 
 
 def missing_effects(report: DiagnosisReport) -> list[Effect]:
-    """Return the accepted effects that the project does not have, or has with another text.
-
-    Empty without a diagnosis. Lines are compared exactly; an effect is there if one of several
-    files with its name is equal.
-    """
+    """Return the accepted effects that the project does not have with the same lines."""
     project = report.case.project
     accepted = report.diagnosis.selection.accepted if report.diagnosis else ()
     found = []
@@ -133,8 +121,8 @@ def _single_effect_lines(
 ) -> list[str]:
     """Return the lines of an effect with its fitted values.
 
-    A parameter per recording has its mean, and the single values as a comment. Values that are
-    multiples of a magnitude and are not fitted are written too: a variant has no recordings.
+    A parameter per recording has its mean. Multiples of a magnitude that are not fitted are written
+    too: a variant has no recordings.
     """
     placed_effect, own_names = (
         candidate_fit.placed_effect,

@@ -18,11 +18,10 @@ MAX_INPUTS = 3
 
 
 def draw_window(window: WorstWindow, inputs: Mapping[str, str], is_base_only: bool) -> Picture:
-    """Draw a window: its varying inputs, and for each signal the values and the errors below.
+    """Draw the varying inputs of one unit, and values and errors of each signal.
 
-    `inputs` are names with units, in the order of the columns; up to `MAX_INPUTS` (3), those in the
-    unit of the first varying one, are drawn. The time under the observer is grey. With
-    `is_base_only` no effect was accepted, so only the base is drawn.
+    `inputs` are names with units; the time under the observer is grey. With `is_base_only` only the
+    base is drawn.
     """
     driven = _moving_inputs(window, inputs)
     count = len(window.signals)

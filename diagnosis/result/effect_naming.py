@@ -16,11 +16,7 @@ VERDICT_ALIASES = {
 
 
 def verdict_id(placed_effect: PlacedEffect, automaton: Automaton) -> str:
-    """Return the name of an effect in a verdict: that of the effect, but for two effects.
-
-    `backlash` at an element with a `gap` is `second_gap`, and `compliance` at an inertia is
-    `added_inertia`.
-    """
+    """Return the name of an effect in a verdict, which may be a key of `VERDICT_ALIASES`."""
     element = automaton.elements.get(placed_effect.place)
     if element is not None and placed_effect.effect.name == "backlash" and "gap" in element.parts:
         return "second_gap"
@@ -36,11 +32,7 @@ def verdict_id(placed_effect: PlacedEffect, automaton: Automaton) -> str:
 def named_effect_of(
     placed_effect: PlacedEffect, model: Estimate, automaton: Automaton
 ) -> NamedEffect:
-    """Return an effect of a model with its fitted parameters, under their names in the effect file.
-
-    Only free parameters that the effect adds are included, not those of `automaton` (the base). The
-    model must have normal equations.
-    """
+    """Return an effect with its fitted parameters, under their names in the effect file."""
     quantities = quantities_of(model)
     original_names = effect_names(placed_effect)
     own = {

@@ -27,9 +27,7 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class RankedCandidate:
-    """A candidate with its probability and its penalised gain [nats],
-    with standard deviation `std`.
-    """
+    """A candidate with its probability and its penalised gain [nats] ± `std`."""
 
     id: str
     place: str
@@ -42,8 +40,7 @@ class RankedCandidate:
 class Verdict:
     """The result of a diagnosis; docs/diagnosis.md describes each part.
 
-    `fit` gives misfits by set (`train`, `held_out`) and signal; `base` gives recalibrated
-    parameters before and after effects were accepted.
+    `fit` gives misfits by set and signal, `base` parameters before and after effects.
     """
 
     verdict: DecisionOutcome
@@ -60,11 +57,7 @@ class Verdict:
     inputs: Mapping[str, str] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
-        """Return the content of `verdict.json` in the format `modewright-verdict/1`.
-
-        Locations without a gain are left out, unless they are accepted; signals, modes and windows
-        are those of the first one that is left. Numbers that are not finite stay as they are.
-        """
+        """Return the content of `verdict.json`, with the locations that gain or are accepted."""
         locations = [
             location for location in self.location if location.gain > 0.0 or location.is_accepted
         ]

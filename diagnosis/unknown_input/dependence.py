@@ -23,11 +23,7 @@ STANDSTILL_STDS = 0.1
 
 
 def input_dependence(series: Sequence[SampledRecording], disturbances: Sequence[Reals]) -> float:
-    """Return the largest correlation of a disturbance's amplitude with an input's rate or
-    amplitude.
-
-    `disturbances` (samples,) of each recording begin after the burn-in.
-    """
+    """Return the largest correlation of an amplitude with an input's rate or amplitude."""
     pairs = list(zip(series, disturbances, strict=True))
     columns = range(series[0].inputs.shape[1])
     return max(
@@ -46,9 +42,7 @@ def input_dependence(series: Sequence[SampledRecording], disturbances: Sequence[
 def standstill_dependence(
     series: Sequence[SampledRecording], disturbances: Sequence[Reals]
 ) -> float:
-    """Return the largest correlation of a disturbance's
-    amplitude with an output near standstill.
-    """
+    """Return the largest correlation of an amplitude with an output near standstill."""
     most = 0.0
     for column in range(series[0].measured.shape[1]):
         spread = np.nanstd(np.concatenate([one.measured[:, column] for one in series]))
@@ -66,10 +60,7 @@ def _amplitude_correlation(
     features: Sequence[Reals],
     window: float,
 ) -> float:
-    """Return the correlation of an amplitude with a feature, 0 where one of both is constant.
-
-    Both are averaged over a window [reference times] around each sample.
-    """
+    """Return the correlation of moving means of an amplitude and a feature, 0 if constant."""
     loud = [
         _moving_mean(np.abs(u), one, window) for u, one in zip(disturbances, series, strict=True)
     ]

@@ -30,10 +30,7 @@ WINDOW_TIME = OBSERVED_TIME + FREE_TIME
 def compare_misfits(
     before: Estimate, after: Estimate, series: Sequence[SampledRecording]
 ) -> dict[str, Misfit]:
-    """Return the misfit of each compared output for two models that are fitted to `series`.
-
-    The misfits are those of `nrmse`, and times the standard deviation of the output in SI.
-    """
+    """Return the misfit by `nrmse` and in SI of each output for two models fitted to `series`."""
     first, second = nrmse(before, series), nrmse(after, series)
     names = before.candidate.predictor.outputs
     return {
@@ -43,11 +40,9 @@ def compare_misfits(
 
 
 def nrmse(model: Estimate, series: Sequence[SampledRecording]) -> Reals:
-    """Return the root mean square error of free simulation over the standard deviation (outputs,).
+    """Return the error of free simulation over the standard deviation (outputs,), 0 if unknown.
 
-    Only known values in the free parts (`is_free`) of all recordings count; for a model with the
-    output-error criterion all after the burn-in. Values of a run that diverged do not count; an
-    output without values has 0.
+    Known values in free parts count; with the output-error criterion all after the burn-in.
     """
     return _nrmse_of(model, series, simulate_free(model, series))
 
@@ -73,10 +68,7 @@ def _nrmse_of(model: Estimate, series: Sequence[SampledRecording], runs: Sequenc
 
 
 def output_stds(series: Sequence[SampledRecording]) -> Reals:
-    """Return the standard deviation [SI] of each compared output over all recordings (outputs,).
-
-    NaN is ignored; the result is at least 1e-12.
-    """
+    """Return the standard deviation [SI] of each output (outputs,), at least 1e-12."""
     spread = np.nanstd(np.concatenate([one.measured for one in series]), axis=0)
     return np.asarray(np.maximum(spread, 1e-12), dtype=np.float64)
 
@@ -84,8 +76,7 @@ def output_stds(series: Sequence[SampledRecording]) -> Reals:
 def simulate_free(model: Estimate, series: Sequence[SampledRecording]) -> list[Reals]:
     """Return the outputs of a model, observed and free in turn, (samples, outputs) each.
 
-    An observer corrects the model for `OBSERVED_TIME` (5 reference times), then it runs freely for
-    `FREE_TIME` (7.5 reference times). The samples after a run diverged are NaN.
+    Samples after a run diverged are NaN.
     """
     masked = [
         dataclasses.replace(one, measured=np.where(is_free(one)[:, None], np.nan, one.measured))
@@ -107,10 +98,6 @@ def is_after_burn_in(series: SampledRecording) -> NDArray[np.bool_]:
 
 
 def is_free(series: SampledRecording) -> NDArray[np.bool_]:
-    """Return the mask (samples,) of samples in free simulation.
-
-    These are the last `FREE_TIME` of each period of `OBSERVED_TIME` + `FREE_TIME` from the first
-    sample on.
-    """
+    """Return the mask (samples,) of the last `FREE_TIME` of each `WINDOW_TIME`."""
     observed, whole = series.sample_count(OBSERVED_TIME), series.sample_count(WINDOW_TIME)
     return np.asarray(np.mod(np.arange(series.count), whole) >= observed)

@@ -7,10 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Misfit:
-    """Root mean square errors of free simulation before and after a diagnosis.
-
-    They are given relative to the standard deviation of the recorded signal, and in SI.
-    """
+    """Errors of free simulation before and after, over the signal's deviation and in SI."""
 
     nrmse_before: float
     nrmse_after: float

@@ -15,11 +15,9 @@ from diagnosis.validation.free_simulation import OBSERVED_TIME, WINDOW_TIME, is_
 
 @dataclass(frozen=True)
 class WorstWindow:
-    """A window of a recording: times [s] (n,), `inputs` (n, inputs) and outputs (n, outputs) in SI.
+    """A window: times [s] (n,), `inputs` (n, inputs) and outputs (n, outputs) in SI.
 
-    `before` and `after` are the outputs of the base and the model, which run freely from
-    `free_from` [s]. `units` are those of the signals; `title` names the recordings of which it is
-    the worst.
+    Base (`before`) and model (`after`) run freely from `free_from` [s].
     """
 
     recording: str
@@ -36,10 +34,7 @@ class WorstWindow:
 
 @dataclass(frozen=True)
 class FreeRuns:
-    """Outputs [SI] of recordings by two models, observed and free in turn.
-
-    Each has the shape (samples, outputs).
-    """
+    """Outputs [SI] of recordings by two models, observed and free, (samples, outputs) each."""
 
     series: Sequence[SampledRecording]
     before: Sequence[Reals]
@@ -56,10 +51,7 @@ def simulate_free_runs(
 
 
 def rms_by_recording(runs: FreeRuns) -> list[tuple[str, Reals, Reals]]:
-    """Return name and root mean square errors [SI] of each recording, before and after (outputs,).
-
-    Only known values in the free parts (`is_free`) count; an output without any has NaN.
-    """
+    """Return name and errors [SI] of free parts, before and after (outputs,); NaN without values."""
     found = []
     for one, before, after in zip(runs.series, runs.before, runs.after, strict=True):
         alone = is_free(one)
@@ -71,10 +63,8 @@ def rms_by_recording(runs: FreeRuns) -> list[tuple[str, Reals, Reals]]:
 def find_worst_window(runs: FreeRuns, units: Sequence[str], label: str) -> WorstWindow:
     """Return the window with the largest sum of normalised squared errors of the base.
 
-    Windows are `WINDOW_TIME` (12.5 reference times) long and adjacent, the last one of a recording
-    may be shorter; only errors after `OBSERVED_TIME` count, over the standard deviation of the
-    signal in all recordings. The first of equal windows is taken. `label` names the set of
-    recordings in the title, `units` are those of the signals.
+    Windows are adjacent and `WINDOW_TIME` long; errors after `OBSERVED_TIME` count. `label` names
+    the set of recordings in the title.
     """
     series, before, after = runs.series, runs.before, runs.after
     spread = np.nanstd(np.concatenate([one.measured for one in series]), axis=0)
