@@ -147,7 +147,7 @@ def _quantum(values: Reals) -> float:
 
 
 def _noise(times: Reals, values: Reals, period: float) -> float:
-    """Return the standard deviation of white noise from the median third difference at even steps."""
+    """Return the standard deviation of white noise from third differences at even steps."""
     if len(values) < MIN_SAMPLES:
         return 0.0
     third = np.diff(values, 3)

@@ -176,7 +176,7 @@ def _distinct_names(file: RecordedFile, time: str) -> list[str]:
 
 
 def _find_time_column(file: RecordedFile, problems: Problems) -> str:
-    """Return the first column named like time, else the first increasing one, else an empty text."""
+    """Return the first column named like time, else the first increasing one, else none ("")."""
     named = [name for name in file.names if TIME_NAME.fullmatch(name)]
     for name in (*named, *file.names):
         if list(file.names).count(name) != 1:

@@ -56,7 +56,7 @@ def attribute_causes(model_set: ModelSet, location: Location) -> Iterator[str]:
 
 
 def is_inactive(model_set: ModelSet, location: Location, path: str) -> bool:
-    """Return whether an input `path` is near 0 (`INACTIVE_AMPLITUDE`) during most of a disturbance."""
+    """Return whether an input is below `INACTIVE_AMPLITUDE` during most of a disturbance."""
     section, _, name = path.partition(".")
     if section != "inputs" or not location.disturbances:
         return False
@@ -73,7 +73,7 @@ def is_inactive(model_set: ModelSet, location: Location, path: str) -> bool:
 
 
 def balance_of(model_set: ModelSet, section: str, place: str) -> str:
-    """Return `flow.state` of the balance in which an input or inertia acts, else `section.place`."""
+    """Return `flow.state` of the balance in which an input or inertia acts, else the place."""
     element = model_set.automaton.elements.get(place)
     if section == "elements" and element is not None and "speed" in element.parts:
         return f"flow.{'.'.join(element.parts['speed'].reads)}"

@@ -32,7 +32,7 @@ class ParameterVector:
         return ParameterVector(shared, own)
 
     def prior_cost(self, candidate: Candidate) -> float:
-        """Return the negative log density [nats] of the standard normal prior, but for a constant."""
+        """Return the negative log density [nats] of the prior, but for a constant."""
         own = per_recording_mask(candidate)
         return 0.5 * float((self.shared[~own] ** 2).sum() + (self.per_recording[:, own] ** 2).sum())
 

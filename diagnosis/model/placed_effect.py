@@ -91,7 +91,7 @@ class PlacedEffect:
 
 
 def read_effects(folder: Path) -> tuple[Effect, ...]:
-    """Return the effects in the files `*.yaml` directly in a folder, sorted; may raise SpecError."""
+    """Return the effects in the files `*.yaml` directly in a folder; may raise SpecError."""
     problems = Problems()
     found = [read_effect(read_document(path), problems) for path in sorted(folder.glob("*.yaml"))]
     problems.raise_if_errors()

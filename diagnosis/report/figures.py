@@ -185,7 +185,7 @@ def draw_oscillation(oscillations: Sequence[Oscillation], unit: str) -> Picture:
 def draw_whiteness(
     before: Sequence[WhitenessTest], after: Sequence[WhitenessTest], is_base_only: bool
 ) -> Picture:
-    """Draw the autocorrelations of innovations by lag [ms], with the 99 % band, a plot per signal."""
+    """Draw the autocorrelations of innovations by lag [ms] with the 99 % band, for each signal."""
     figure = Figure(figsize=(8.5, 2.7), layout="constrained")
     axes = figure.subplots(1, len(before), squeeze=False, sharey=True)[0]
     for axis, old, new in zip(axes, before, after, strict=True):

@@ -74,7 +74,7 @@ class Cycles:
 
 @dataclass(frozen=True)
 class Oscillation:
-    """The clearest oscillation after a step at `start` [s], and for how long [s] a model follows."""
+    """The clearest oscillation after a step at `start` [s], and how long [s] a model follows."""
 
     recording: str
     start: float

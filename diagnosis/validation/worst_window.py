@@ -51,7 +51,7 @@ def simulate_free_runs(
 
 
 def rms_by_recording(runs: FreeRuns) -> list[tuple[str, Reals, Reals]]:
-    """Return name and errors [SI] of free parts, before and after (outputs,); NaN without values."""
+    """Return name and errors [SI] of free parts, before and after (outputs,), or NaN."""
     found = []
     for one, before, after in zip(runs.series, runs.before, runs.after, strict=True):
         alone = is_free(one)
