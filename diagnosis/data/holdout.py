@@ -18,10 +18,9 @@ def require_disjoint(train: Sequence[str | Path], held_out: Sequence[str | Path]
     """
     for one, other in itertools.combinations(train, 2):
         _require_no_overlap(other, "is named twice: each recording counts once", one)
+    twice = "is held out twice: each recording counts once"
     for one, other in itertools.combinations(held_out, 2):
-        _require_no_overlap(
-            other, "is held out twice: each recording counts once", one, opened=False
-        )
+        _require_no_overlap(other, twice, one, opened=False)
     for file in held_out:
         path = strip_window_suffix(Path(file))
         if not path.is_file() or not os.access(path, os.R_OK):
@@ -35,7 +34,6 @@ def _require_no_overlap(
 ) -> None:
     """Raise ValueError with `reason` if two files share values; `opened` compares contents."""
     if paths_overlap(Path(file), Path(other), opened):
-        same = os.path.realpath(strip_window_suffix(Path(file))) == os.path.realpath(
-            strip_window_suffix(Path(other))
-        )
-        raise ValueError(f"{file} {reason}" if same else f"{file}, a copy of {other}, {reason}")
+        paths = {os.path.realpath(strip_window_suffix(Path(one))) for one in (file, other)}
+        copied = f", a copy of {other}," if len(paths) > 1 else ""
+        raise ValueError(f"{file}{copied} {reason}")

@@ -30,12 +30,8 @@ def noise_of(values: Reals) -> float:
 
 def _window_medians(sizes: Reals) -> Reals:
     """Return the median of each window of `sizes` (n,), of `WINDOW_SAMPLES` or more, in order."""
-    count = max(1, len(sizes) // WINDOW_SAMPLES)
-    width, more = divmod(len(sizes), count)
-    edge = more * (width + 1)
-    longer, others = sizes[:edge].reshape(more, width + 1), sizes[edge:].reshape(-1, width)
-    found = [np.median(part, axis=1) for part in (longer, others) if len(part)]
-    return np.concatenate(found)
+    windows = np.array_split(sizes, max(1, len(sizes) // WINDOW_SAMPLES))
+    return np.array([np.median(window) for window in windows])
 
 
 def quantum_of(values: Reals) -> float:

@@ -106,10 +106,8 @@ class SampledRecording:
     @cached_property
     def noise(self) -> tuple[Reals, Reals]:
         """The noise standard deviations by `noise_of`: (outputs,) and (inputs,)."""
-        seen, inputs = (
-            [noise_of(column) for column in values.T] for values in (self.measured, self.inputs)
-        )
-        return np.array(seen), np.array(inputs)
+        seen = np.array([noise_of(column) for column in self.measured.T])
+        return seen, np.array([noise_of(column) for column in self.inputs.T])
 
 
 def compared_outputs(mapping: RecordingMap, automaton: Automaton) -> tuple[str, ...]:
@@ -126,13 +124,10 @@ def sample_windows(
     Inputs without a channel have the constant of the map, else their default; KeyError without
     both. Raises ValueError if a window has too few samples.
     """
-    constants = {name: float(value) for name, (value, _) in mapping.constants.items()}
-    declared = {
-        name: float(thing.default)
-        for name, thing in automaton.inputs.items()
-        if thing.default is not None
+    known = {
+        n: float(one.default) for n, one in automaton.inputs.items() if one.default is not None
     }
-    known = {**declared, **constants}
+    known |= {name: float(value) for name, (value, _) in mapping.constants.items()}
     return tuple(
         sample_recording(piece, list(automaton.inputs), output_names, known)
         for piece in split_by_windows(recording)
@@ -153,43 +148,34 @@ def sample_recording(
     value in `defaults` (KeyError), an output without one is NaN. Raises ValueError for fewer than
     two samples.
     """
-    input_channels = {
-        c.column.to: c for c in recording.channels.values() if c.column.to is not None
-    }
-    output_channels = {c.column.compare: c for c in recording.channels.values() if c.column.compare}
-    used = [
-        *input_channels.values(),
-        *(output_channels[name] for name in output_names if name in output_channels),
-    ]
+    driven = {c.column.to: c for c in recording.channels.values() if c.column.to is not None}
+    seen = {c.column.compare: c for c in recording.channels.values() if c.column.compare}
+    compared = [seen[name] for name in output_names if name in seen]
+    used = [*driven.values(), *compared]
     short = next((channel for channel in used if len(channel.times) < 2), None)
     if short is not None:
         raise ValueError(f"{recording.name}: `{short.column.name}` has one sample only")
     end = min(channel.times[-1] for channel in used)
-    start = _first_common_stamp(
-        [output_channels[name] for name in output_names if name in output_channels], used
-    )
+    start = _first_common_stamp(compared, used)
     step = period or min(grid_period(channel.times) for channel in used)
     count = int((end - start) / step + MAX_SLIP) + 1
     if count < 2:
         raise ValueError(f"{recording.name}: only {count} samples in common")
-    input_values = np.stack(
-        [
-            _sample_input(input_channels.get(name), start, step, count, defaults, name)
-            for name in inputs
-        ]
-    )
-    output_values = np.stack(
-        [_sample_output(output_channels.get(name), start, step, count) for name in output_names]
-    )
+    columns = [
+        _sample_input(driven[name], start, step, count)
+        if name in driven
+        else np.full(count, defaults[name])
+        for name in inputs
+    ]
+    measured = [_sample_output(seen.get(name), start, step, count) for name in output_names]
     return SampledRecording(
         recording.name,
         step,
         start,
-        np.ascontiguousarray(input_values.T),
-        np.ascontiguousarray(output_values.T),
+        np.stack(columns, axis=1),
+        np.stack(measured, axis=1),
         holds=tuple(
-            _hold_of(input_channels.get(name), values)
-            for name, values in zip(inputs, input_values, strict=True)
+            _hold_of(driven.get(name), column) for name, column in zip(inputs, columns, strict=True)
         ),
     )
 
@@ -362,17 +348,8 @@ def _sample_indices(channel: Channel, start: Fraction, step: Fraction) -> NDArra
     return np.rint((channel.seconds - float(start)) / float(step)).astype(np.int64)
 
 
-def _sample_input(
-    channel: Channel | None,
-    start: Fraction,
-    step: Fraction,
-    count: int,
-    defaults: Mapping[str, float],
-    name: str,
-) -> Reals:
-    """Return an input on the grid (count,): held or interpolated; a constant without a channel."""
-    if channel is None:
-        return np.full(count, defaults[name])
+def _sample_input(channel: Channel, start: Fraction, step: Fraction, count: int) -> Reals:
+    """Return an input on the grid (count,), held or interpolated."""
     if channel.column.hold == "linear":
         grid = float(start) + float(step) * np.arange(count)
         return np.asarray(np.interp(grid, channel.seconds, channel.array), dtype=np.float64)

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.data.array_types import Reals
-from diagnosis.data_quality.finding import Finding
+from diagnosis.data_quality.finding import Finding, Severity
 from engine.recordings.recording import Channel, Recording
 
+Interval = tuple[float, float]
+"""Start and end of an interval [s]."""
 GAP_FACTOR = 1.5
 """A time step above this multiple of the median step has lost samples."""
 LONG_GAP_FACTOR = 10.0
@@ -53,14 +55,14 @@ class ChannelCheck:
     rate: float
     jitter: float
     dropped: float
-    gaps: tuple[tuple[float, float], ...]
+    gaps: tuple[Interval, ...]
     quantum: float
     noise: float
     low: float
     high: float
     repeated: float
     clipped: float
-    stuck: tuple[float, float] | None
+    stuck: Interval | None
 
 
 def check_channel(recording: Recording, channel: Channel) -> ChannelCheck:
@@ -101,15 +103,12 @@ def channel_findings(check: ChannelCheck, is_compared: bool) -> list[Finding]:
     """Return the findings on a channel, at most three of them gaps, in a fixed order of kinds."""
     findings: list[Finding] = []
 
-    def report(
-        kind: str, text: str, severity: str, window: tuple[float, float] | None = None
-    ) -> None:
-        findings.append(
-            Finding(kind, check.recording, check.name, text, severity, window)  # type: ignore[arg-type]
-        )
+    def report(kind: str, text: str, severity: Severity, window: Interval | None = None) -> None:
+        findings.append(Finding(kind, check.recording, check.name, text, severity, window))
 
     if check.low == check.high and is_compared:
         report("no_signal", f"is {check.low:g} all the time: the signal is missing", "error")
+    severity: Severity
     if check.dropped >= SOME_DROPPED:
         severity = "error" if check.dropped >= MUCH_DROPPED else "warning"
         report("dropped", f"{check.dropped:.0%} of its samples are missing", severity)
@@ -182,9 +181,7 @@ def _runs_of_equal(equal: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _stuck_interval(
-    times: Reals, values: Reals, quantum: float, noise: float
-) -> tuple[float, float] | None:
+def _stuck_interval(times: Reals, values: Reals, quantum: float, noise: float) -> Interval | None:
     """Return the longest interval with one nonzero value in a noisy channel; None if short."""
     if noise <= 0.5 * quantum or noise <= 0.0:
         return None

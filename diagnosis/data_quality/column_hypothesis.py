@@ -156,28 +156,16 @@ def find_column_errors(
     shared = _clearest_hypothesis(whole, sum(min_gains)) if len(series) > 1 else None
     errors = [one for one in own if one]
     similar = [one for one in errors if shared and one.is_similar(shared)]
-    if (
-        shared
-        and len(similar) > SHARED_FRACTION * len(errors)
-        and len(similar) >= max(2.0, len(series) / 3.0)
-    ):
+    least = max(2.0, len(series) / 3.0)
+    if shared and len(similar) > SHARED_FRACTION * len(errors) and len(similar) >= least:
         lag = median(one.lag for one in similar)
         return [ColumnError(dataclasses.replace(shared, lag=lag), "")]
-    named = zip(own, series, strict=True)
-    return [
-        ColumnError(hypothesis, one.name)
-        for hypothesis, one in named
-        if hypothesis and _is_uniform(hypothesis, own)
+    return [  # different errors of a column indicate missing physics
+        ColumnError(own_error, one.name)
+        for own_error, one in zip(own, series, strict=True)
+        if own_error
+        if all(e.is_similar(own_error) for e in errors if e.column == own_error.column)
     ]
-
-
-def _is_uniform(
-    hypothesis: ColumnHypothesis, hypotheses: Sequence[ColumnHypothesis | None]
-) -> bool:
-    """Return whether all errors of a column are similar; others indicate missing physics."""
-    return all(
-        one.is_similar(hypothesis) for one in hypotheses if one and one.column == hypothesis.column
-    )
 
 
 def hypothesis_gains(
@@ -205,7 +193,10 @@ def hypothesis_gains(
     for hypothesis in hypotheses:
         right = [apply_hypothesis(one, hypothesis) for one in series]
         model = base if hypothesis.factor == 1 else _evaluate_declared(candidate, right)
-        found[hypothesis] = _finite_gains(before, _high_pass_costs(model, right))
+        after = _high_pass_costs(model, right)
+        known = np.isfinite(before) & np.isfinite(after)
+        found[hypothesis] = np.full(len(series), -np.inf)
+        found[hypothesis][known] = before[known] - after[known]
     return found
 
 
@@ -220,22 +211,18 @@ def apply_hypothesis(series: SampledRecording, hypothesis: ColumnHypothesis) -> 
     moved = slice(inside.start + late, inside.stop + late)
     factor = hypothesis.factor or UNUSED_FACTOR
     inputs, measured = series.inputs[inside].copy(), series.measured[inside].copy()
-    count = inputs.shape[1]
-    if hypothesis.column < count:
-        inputs[:, hypothesis.column] = factor * series.inputs[moved, hypothesis.column]
+    column, count = hypothesis.column, inputs.shape[1]
+    if column < count:
+        inputs[:, column] = factor * series.inputs[moved, column]
     else:
-        measured[:, hypothesis.column - count] = (
-            factor * series.measured[moved, hypothesis.column - count]
-        )
+        measured[:, column - count] = factor * series.measured[moved, column - count]
     return dataclasses.replace(series, inputs=inputs, measured=measured)
 
 
 def _evaluate_declared(candidate: Candidate, series: Sequence[SampledRecording]) -> Estimate:
     """Return the declared model with disturbances that let it follow the recordings."""
-    noise_levels = measured_noise_levels(series, {})
-    noise_levels = dataclasses.replace(
-        noise_levels, process=disturbance_units(candidate, series, {})
-    )
+    process = disturbance_units(candidate, series, {})
+    noise_levels = dataclasses.replace(measured_noise_levels(series, {}), process=process)
     return evaluate(candidate, series, noise_levels, vector_of(candidate, len(series), {}))
 
 
@@ -249,18 +236,10 @@ def _high_pass_costs(model: Estimate, series: Sequence[SampledRecording]) -> Rea
         series, there.done.tolist(), there.by_recording, there.counts, strict=True
     ):
         quick = _high_pass(missed, float(one.period))
-        spread = np.log(np.maximum(_column_means(quick**2), 1e-300))
+        spread = np.log(np.maximum(np.nanmean(quick**2, axis=0), 1e-300))
         whole = done == one.count
         found.append(float(np.sum(0.5 * counts * spread)) if whole else np.inf)
     return np.array(found)
-
-
-def _column_means(squares: Reals) -> Reals:
-    """Return the mean of the known values of each column."""
-    if np.isnan(squares).any():
-        return np.asarray(np.nanmean(squares, axis=0), dtype=np.float64)
-    found: Reals = squares.sum(axis=0) / len(squares)
-    return found
 
 
 def _high_pass(innovations: Reals, period: float) -> Reals:
@@ -271,13 +250,6 @@ def _high_pass(innovations: Reals, period: float) -> Reals:
     slow = np.array([np.convolve(column, kernel, mode="same") for column in known.T]).T
     found: Reals = innovations - slow
     return found
-
-
-def _finite_gains(before: Reals, after: Reals) -> Reals:
-    """Return the gains (recordings,), -inf where one of both models diverges."""
-    known = np.isfinite(before) & np.isfinite(after)
-    found = np.where(known, before, 0.0) - np.where(known, after, 0.0)
-    return np.where(known, found, -np.inf)
 
 
 def _clearest_hypothesis(
@@ -293,8 +265,5 @@ def _clearest_hypothesis(
         return None
     small = max([0.0, *[gain for one, gain in gains.items() if not one.is_error]])
     other = max([0.0, *[gain for one, gain in gains.items() if one.column != best.column]])
-    return (
-        best
-        if gains[best] > max(HARMLESS_GAIN_FACTOR * small, OTHER_COLUMN_FACTOR * other)
-        else None
-    )
+    least = max(HARMLESS_GAIN_FACTOR * small, OTHER_COLUMN_FACTOR * other)
+    return best if gains[best] > least else None

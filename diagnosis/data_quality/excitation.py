@@ -1,9 +1,8 @@
-"""Excitation: the steps, bands and ranges of recorded signals,
-and the effects that they can show.
-"""
+"""Excitation: steps, bands and ranges of recorded signals, and the effects they can show."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -158,14 +157,12 @@ def analyse_excitation(
     if not inputs:  # A speed that is an input is the only excitation.
         inputs = [s for s in speeds if used[0].channels[s.name].column.to is not None]
     met = _met_needs(used, inputs, speeds, checks)
-    effects = [
-        EffectTestability(
-            effect, tuple(NEED_DESCRIPTIONS[need] for need in needs if need not in met)
-        )
+    effects = tuple(
+        EffectTestability(effect, tuple(NEED_DESCRIPTIONS[n] for n in needs if n not in met))
         for effect, needs in EFFECT_NEEDS.items()
-    ]
+    )
     total = sum(float(piece.end - piece.start) for piece in used)
-    return Excitation(total, tuple(inputs), tuple(speeds), tuple(effects))
+    return Excitation(total, tuple(inputs), tuple(speeds), effects)
 
 
 def _with_derived_speeds(piece: Recording) -> Recording:
@@ -253,6 +250,7 @@ def _met_needs(
 ) -> set[str]:
     """Return the needs that recordings meet."""
     sizes = [abs(size) for signal in inputs for size in signal.steps]
+    pairs = list(itertools.product(inputs, speeds))
     tests = {
         "fast": any(signal.steps or signal.band >= 5.0 for signal in inputs),
         "sampled_fast": max((check.rate for check in checks), default=0.0) >= 49.0,
@@ -267,22 +265,16 @@ def _met_needs(
         "turns": any(_revolutions(used, signal) >= 5.0 for signal in speeds),
         "moves": any(_time_moving(used, signal) >= 2.0 for signal in speeds),
         "brakes": any(_is_brake(signal) for signal in inputs),
+        "both_signs": any(_has_both_signs_at_one_speed(used, *pair) for pair in pairs),
+        "power": any(_has_power_range(used, *pair) for pair in pairs),
     }
-    met = {need for need, is_met in tests.items() if is_met}
-    if any(_has_both_signs_at_one_speed(used, i, s) for i in inputs for s in speeds):
-        met.add("both_signs")
-    if any(_has_power_range(used, i, s) for i in inputs for s in speeds):
-        met.add("power")
-    return met
+    return {need for need, is_met in tests.items() if is_met}
 
 
 def _is_brake(signal: SignalExcitation) -> bool:
     """Return whether an input is never negative and has at least two steps."""
-    return (
-        signal.high > 0.0
-        and signal.low >= -REVERSAL_FRACTION * signal.high
-        and len(signal.steps) >= 2
-    )
+    is_positive = signal.high > 0.0 and signal.low >= -REVERSAL_FRACTION * signal.high
+    return is_positive and len(signal.steps) >= 2
 
 
 def _revolutions(used: Sequence[Recording], signal: SignalExcitation) -> float:

@@ -14,8 +14,7 @@ from fractions import Fraction
 import numpy as np
 
 from diagnosis.data.array_types import Reals
-from diagnosis.data_quality.output_comparison import OutputComparison
-from diagnosis.data_quality.reference_model import ReferenceModel
+from diagnosis.data_quality.output_comparison import OutputComparison, ReferenceModel
 from engine.recordings.recording import Channel, Recording, crop, split_by_windows
 
 GRID_STEP = 0.01

@@ -5,8 +5,9 @@ from __future__ import annotations
 import dataclasses
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from engine.simulation.simulate import simulate
 from engine.simulation.stimuli import stimulus_of
 from language.expressions.syntax_tree import Name
 from language.ir.program import Program
+from language.loading.load import program_of
 from language.loading.system_reader import single_instance_system
 from language.model.automaton import Automaton
 from language.model.declaration import Formula, Input
@@ -100,10 +102,8 @@ def simulate_free_run(
         if (source := automaton.output_source(channel.column.compare or "")) in automaton.states
     }
     initial_inputs = {
-        INITIAL_INPUT_NAME.format(name): Stimulus(
-            (StimulusPiece(Fraction(0), initial_values[name]),)
-        )
-        for name in initial_values
+        INITIAL_INPUT_NAME.format(name): Stimulus((StimulusPiece(Fraction(0), value),))
+        for name, value in initial_values.items()
     }
     scenario = Scenario(
         name=recording.name,
@@ -188,3 +188,53 @@ def _compare_output(
         np.array(channel.values[first : first + until]),
         np.interp(times[:until], trajectory.times, signal),
     )
+
+
+MAX_STEP, STABILITY_MARGIN = 0.004, 3.0
+"""Longest major step [s], and the margin to the largest stable step."""
+
+
+@dataclass(frozen=True)
+class ReferenceModel:
+    """An automaton with its recording map; `run_programs` executes its Programs."""
+
+    automaton: Automaton
+    mapping: RecordingMap
+    run_programs: RunFunction = run_interpreter
+    _programs: ProgramCache = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def coarse_automaton(self) -> Automaton:
+        """The automaton with the longest stable step that resolves motion of 4 Hz.
+
+        The step of an automaton without stability limits is unchanged.
+        """
+        motion = program_of(self.automaton).integration
+        limits = [limit.step for limit in motion.stability_limits] if motion else []
+        if not limits:
+            return self.automaton
+        most = min(MAX_STEP, min(limits) / STABILITY_MARGIN)
+        step = max(self.automaton.step, Fraction(round(most * 1e6), 10**6))
+        return dataclasses.replace(self.automaton, step=step)
+
+    def simulate(self, recording: Recording) -> FreeRun:
+        """Return a free run of the coarse automaton; SpecError as in `simulate_free_run`."""
+        return simulate_free_run(
+            self.coarse_automaton, recording, self.mapping, self.run_programs, self._programs
+        )
+
+
+_cache: list[ReferenceModel] = []
+
+
+def cached_reference(
+    automaton: Automaton, mapping: RecordingMap, run_programs: RunFunction
+) -> ReferenceModel:
+    """Return the reference model; the latest one is reused for identical arguments."""
+    if _cache:
+        latest = _cache[0]
+        same = latest.automaton is automaton and latest.mapping is mapping
+        if same and latest.run_programs is run_programs:
+            return latest
+    _cache[:] = [ReferenceModel(automaton, mapping, run_programs)]
+    return _cache[0]

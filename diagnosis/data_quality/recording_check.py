@@ -12,9 +12,8 @@ from diagnosis.data_quality.excitation import Excitation, analyse_excitation
 from diagnosis.data_quality.finding import Finding, sort_by_severity
 from diagnosis.data_quality.model_agreement import OutputAgreement, compare_with_simulation
 from diagnosis.data_quality.outlier import drop_huge_values, find_long_pauses, find_outliers
-from diagnosis.data_quality.output_comparison import RunFunction, run_interpreter
+from diagnosis.data_quality.output_comparison import RunFunction, cached_reference, run_interpreter
 from diagnosis.data_quality.redundant_speeds import find_redundant_speeds
-from diagnosis.data_quality.reference_model import cached_reference
 from diagnosis.data_quality.unit_correction import (
     find_corrections,
     find_millisecond_time,

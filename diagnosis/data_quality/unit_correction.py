@@ -20,7 +20,7 @@ from diagnosis.data_quality.model_agreement import (
     compare_with_simulation,
     most_excited_piece,
 )
-from diagnosis.data_quality.reference_model import ReferenceModel
+from diagnosis.data_quality.output_comparison import ReferenceModel
 from diagnosis.data_quality.unit_sign_clock_errors import SHARED_FRACTION, UNIT_FACTORS
 from engine.recordings.recording import Channel, Recording, split_by_windows
 from language.expressions.units import are_compatible, parse_unit
@@ -97,39 +97,30 @@ def find_corrections(
     outputs correlate by `SURE_CORRELATION`. A correction that all have is reported once.
     """
     by_name = {one.name: [r for r in agreements if r.recording == one.name] for one in recordings}
-    sure = {
-        name
-        for f in findings
-        if f.kind == "unit"
-        for name in ([f.recording] if f.recording else by_name)
-    }
-    inconsistent = [
-        one
-        for one in recordings
-        if any(_is_inconsistent(r) for r in by_name[one.name])
+    by_name = {
+        name: each
+        for name, each in by_name.items()
+        if any(_is_inconsistent(r) for r in each)
         and not (
-            one.name in sure
-            and all(abs(r.correlation) > SURE_CORRELATION for r in by_name[one.name])
+            any(f.kind == "unit" and f.recording in ("", name) for f in findings)
+            and all(abs(r.correlation) > SURE_CORRELATION for r in each)
         )
-    ]
-    inconsistent = sorted(
-        inconsistent, key=lambda one: -max(_distance(r) for r in by_name[one.name])
-    )
+    }
+    distances = {name: max(_distance(r) for r in each) for name, each in by_name.items()}
+    inconsistent = [one for one in recordings if one.name in distances]
+    inconsistent.sort(key=lambda one: -distances[one.name])
     corrections: dict[str, ColumnCorrection] = {}
     for recording in inconsistent[:MAX_TESTED_RECORDINGS]:
         part = most_excited_piece(split_by_windows(recording)[0], MIN_PIECE)
-        most = max(_distance(r) for r in by_name[recording.name]) - MIN_DISTANCE
+        most = distances[recording.name] - MIN_DISTANCE
         best = _best_correction(part, list(dict.fromkeys(corrections.values())), most, reference)
         possible = _candidate_corrections(recording, reference.automaton, by_name[recording.name])
         best = best or _best_correction(part, possible, most, reference)
         if best is not None:
             corrections[recording.name] = best
     distinct = set(corrections.values())
-    if (
-        len(distinct) == 1
-        and len(inconsistent) >= max(2.0, SHARED_FRACTION * len(recordings))
-        and len(corrections) > 1
-    ):
+    least = max(2.0, SHARED_FRACTION * len(recordings))
+    if len(distinct) == 1 and len(corrections) > 1 and len(inconsistent) >= least:
         return [distinct.pop().to_finding("")]
     return [correction.to_finding(name) for name, correction in corrections.items()]
 
@@ -139,20 +130,13 @@ def find_millisecond_time(recording: Recording, reference: ReferenceModel) -> li
 
     It is an error if all outputs agree after a division by 1000, else a warning.
     """
-    usual = min(
-        (
-            float(np.median(np.diff(one.seconds)))
-            for one in recording.channels.values()
-            if len(one.times) > 1
-        ),
-        default=0.0,
-    )
+    channels = [one for one in recording.channels.values() if len(one.times) > 1]
+    usual = min((float(np.median(np.diff(one.seconds))) for one in channels), default=0.0)
     steps = usual / float(reference.automaton.step)
     if usual < MAX_SAMPLE_TIME or steps < MAX_SAMPLE_STEPS:
         return []
-    text = (
-        f"a sample each {usual:.4g} s is one in {steps:.4g} steps of `{reference.automaton.name}`"
-    )
+    name = reference.automaton.name
+    text = f"a sample each {usual:.4g} s is one in {steps:.4g} steps of `{name}`"
     try:
         part = most_excited_piece(split_by_windows(_scale_time(recording))[0], MIN_PIECE)
         after = compare_with_simulation([part], reference)
@@ -246,12 +230,8 @@ def replace_corrected(findings: Sequence[Finding], corrections: Sequence[Finding
     A unit correction beside a unit finding is dropped; one of all recordings ("") replaces all.
     """
     same = {(f.channel, f.recording) for f in findings if f.kind == "unit"}
-    new = [
-        cure
-        for cure in corrections
-        if cure.kind != "unit" or (cure.channel, cure.recording) not in same
-    ]
-    where = {cure.recording for cure in new}
+    new = [f for f in corrections if f.kind != "unit" or (f.channel, f.recording) not in same]
+    where = {f.recording for f in new}
     if "" in where:
-        return list(new)
-    return [*[f for f in findings if f.recording not in where], *new]
+        return new
+    return [*(f for f in findings if f.recording not in where), *new]

@@ -10,15 +10,13 @@ from statistics import median
 from diagnosis.data_quality.finding import Finding, Severity
 from diagnosis.data_quality.model_agreement import OutputAgreement
 from engine.recordings.recording import Recording
-from language.expressions.units import Dimension, are_compatible, parse_unit
+from language.expressions.units import are_compatible, parse_unit
 from language.loading.recording_map_reader import column_dimension
 from language.model.automaton import Automaton
 from language.model.system import RecordingMap
 
 OFFSET_ERROR, OFFSET_WARNING = 0.1, 0.08
-"""Clock offsets [s] that are an error and a warning;
-actuators and sensors have lags up to 0.05 s.
-"""
+"""Clock offsets [s] that are errors and warnings; actuators and sensors have lags up to 0.05 s."""
 SINGLE_RECORDING_MARGIN = 0.1
 """Increase of the correlation from which a lag in a single recording of several is reported."""
 CLOCK_TOLERANCE = 0.04
@@ -68,43 +66,35 @@ def find_unit_sign_clock_errors(
         )
         for recording in recordings
     }
+    single = [finding for findings in own.values() for finding in findings]
     clear = {agreement.recording for agreement in agreements if agreement.is_clear}
     if len(clear) < 2:
-        return [finding for findings in own.values() for finding in findings]
+        return single
     shared = [
         finding
         for finding in _find_errors("", agreements, automaton, mapping, recordings)
         if _is_shared(finding, own, agreements)
     ]
-    outputs = {agreement.channel for agreement in agreements}
-    reported_kinds = {
-        kind for f in shared if f.channel not in outputs for kind in _similar_kinds(f.kind)
-    }
-    rest = [
-        f
-        for fs in own.values()
-        for f in fs
-        if not _has_similar(shared, f) and f.kind not in reported_kinds
-    ]
-    units = [f for findings in own.values() for f in findings if f.kind == "unit"]
+    units = [f for f in single if f.kind == "unit"]
     if 2 * len({f.recording for f in units}) >= len(recordings):
-        units = [f for f in shared if f.kind == "unit"] or units
-        return units  # Single recordings show which unit it is.
+        return [f for f in shared if f.kind == "unit"] or units  # single ones show which unit
     if any(finding.kind != "clock_offset" for finding in shared):
         return shared  # Other findings are consequences of these.
+    outputs = {agreement.channel for agreement in agreements}
+    reported = {kind for f in shared if f.channel not in outputs for kind in _similar_kinds(f.kind)}
+    rest = [f for f in single if not _has_similar(shared, f) and f.kind not in reported]
     sure = {
         r.recording
         for r in agreements
         if r.is_clear and r.correlation_gain > SINGLE_RECORDING_MARGIN
     }
-    return [
-        *shared,
-        *[
-            _weaken_clock_finding(f)
-            for f in rest
-            if f.kind != "clock_offset" or f.recording in sure
-        ],
-    ]
+    found = list(shared)
+    for finding in rest:
+        if finding.kind != "clock_offset":
+            found.append(finding)
+        elif finding.recording in sure:  # In a single recording an actuator may be slow instead.
+            found.append(replace(finding, severity="warning"))
+    return found
 
 
 def agrees_with_other_outputs(finding: Finding, agreements: Sequence[OutputAgreement]) -> bool:
@@ -139,13 +129,6 @@ def _is_shared(
     return count >= 2 and count > SHARED_FRACTION * len(clear)
 
 
-def _weaken_clock_finding(finding: Finding) -> Finding:
-    """Return a clock finding as a warning: in single recordings an actuator may be slow instead."""
-    if finding.kind != "clock_offset":
-        return finding
-    return replace(finding, severity="warning")
-
-
 def _has_similar(findings: Sequence[Finding], finding: Finding) -> bool:
     """Return whether findings contain one of a similar kind on the same channel."""
     return any(
@@ -166,11 +149,10 @@ def _find_errors(
     recordings: Sequence[Recording],
 ) -> list[Finding]:
     """Return sign and unit errors of clear agreements, or clock errors if there are none."""
-    clear = [agreement for agreement in agreements if agreement.is_clear]
-    by_channel = {
-        channel: [r for r in clear if r.channel == channel]
-        for channel in dict.fromkeys(r.channel for r in clear)
-    }
+    by_channel: dict[str, list[OutputAgreement]] = {}
+    for agreement in agreements:
+        if agreement.is_clear:
+            by_channel.setdefault(agreement.channel, []).append(agreement)
     if not by_channel:
         return []
     one = _AgreementsByChannel(name, recordings, automaton, mapping, by_channel)
@@ -208,21 +190,16 @@ class _AgreementsByChannel:
             return channels[0], f"`{channels[0]}` or input `{self.inputs[0]}`"
         return channels[0], f"`{channels[0]}`"
 
-    def _finding(self, kind: str, channel: str, text: str, severity: Severity) -> Finding:
-        """Return a finding on this recording."""
-        return Finding(kind, self.name, channel, text, severity)
-
     def find_sign_errors(self) -> list[Finding]:
         """Return errors for outputs with a negative gain; one for the input if all are negative."""
         odd = [name for name, gain in self.gains.items() if gain < 0.0]
         if not odd:
             return []
-        groups = [odd] if len(odd) == len(self.gains) else [[name] for name in odd]
         found = []
-        for group in groups:
+        for group in [odd] if len(odd) == len(self.gains) else [[name] for name in odd]:
             channel, called = self._attribute(group)
             text = f"{called} has the wrong sign: it moves against what the model gives"
-            found.append(self._finding("sign", channel, text, "error"))
+            found.append(Finding("sign", self.name, channel, text, "error"))
         return found
 
     def find_unit_errors(self) -> list[Finding]:
@@ -245,29 +222,36 @@ class _AgreementsByChannel:
     def _shared_scale_finding(self, outputs: Sequence[str], channel: str, subject: str) -> Finding:
         """Return the finding on all outputs: a scale of the input or a shared unit."""
         size = median(abs(self.gains[name]) for name in outputs)
-        if not _unit_error_reason(1.0 / size, column_dimension(self.mapping.columns[channel])):
+        if not self._unit_error_reason(channel, 1.0 / size):
             reasons = {
-                _unit_error_reason(
-                    size, column_dimension(self.mapping.columns[name]), SHARED_FACTOR_TOLERANCE
-                )
-                for name in outputs
+                self._unit_error_reason(name, size, SHARED_FACTOR_TOLERANCE) for name in outputs
             }
             if len(reasons) == 1 and reasons != {""}:
                 both = " and ".join(f"`{name}`" for name in outputs)
                 text = f"{both} are {size:.3g} times what the model gives: {reasons.pop()}?"
-                return self._finding("unit", outputs[0], text, "error")
+                return Finding("unit", self.name, outputs[0], text, "error")
         return self._scale_finding(channel, subject, 1.0 / size, False)
 
     def _scale_finding(self, channel: str, subject: str, size: float, is_output: bool) -> Finding:
         """Return a unit error if a factor explains the size, else a scale warning."""
-        dimension = column_dimension(self.mapping.columns[channel])
         share = f"{size:.3g} times" if size > 1.0 else f"1/{1.0 / size:.3g} of"
-        source = _unit_error_reason(size, dimension)
-        what = f"{share} what the model {'gives' if is_output else 'needs'}"
-        text = f"{subject} is {what}" + (f": {source}?" if source else "")
+        text = f"{subject} is {share} what the model {'gives' if is_output else 'needs'}"
+        source = self._unit_error_reason(channel, size)
         if source:
-            return self._finding("unit", channel, text, "error")
-        return self._finding("scale", channel, text, "warning")
+            return Finding("unit", self.name, channel, f"{text}: {source}?", "error")
+        return Finding("scale", self.name, channel, text, "warning")
+
+    def _unit_error_reason(
+        self, channel: str, size: float, tolerance: float = FACTOR_TOLERANCE
+    ) -> str:
+        """Return the unit error that explains a ratio of measured to simulated, or ""."""
+        dimension = column_dimension(self.mapping.columns[channel])
+        distance, reason = min(
+            (abs(math.log(size / factor)), reason)
+            for factor, unit, reason in UNIT_FACTORS
+            if not unit or are_compatible(parse_unit(unit).dimension, dimension)
+        )
+        return reason if distance < math.log(1.0 + tolerance) else ""
 
     def find_clock_errors(self) -> list[Finding]:
         """Return findings on outputs with a larger lag than actuators and sensors have."""
@@ -276,44 +260,28 @@ class _AgreementsByChannel:
             return []
         lags = [self.lags[name] for name in odd]
         together = len(odd) == len(self.lags) and max(lags) - min(lags) < CLOCK_TOLERANCE
-        return [
-            self._clock_offset_finding(group, together)
-            for group in ([odd] if together else [[n] for n in odd])
-        ]
+        groups = [odd] if together else [[name] for name in odd]
+        return [self._clock_offset_finding(group, together) for group in groups]
 
     def _clock_offset_finding(self, channels: Sequence[str], is_shared: bool) -> Finding:
         """Return the clock finding on channels: an error if most agreements have the same lag."""
         lag = median(self.lags[name] for name in channels)
-        channel, called = (
-            self._attribute(channels) if is_shared else (channels[0], f"`{channels[0]}`")
-        )
+        channel, called = channels[0], f"`{channels[0]}`"
+        if is_shared:
+            channel, called = self._attribute(channels)
         later = (lag > 0.0) == (channel in self.lags)
         text = f"the clock of {called} is {abs(lag):.2f} s {'late' if later else 'early'}"
         if is_shared and len(channels) == 1 and self.inputs:
             both = f"`{channels[0]}` and input `{self.inputs[0]}`"
             text = f"the clocks of {both} are {abs(lag):.2f} s apart"
         each = [r.significant_lag for name in channels for r in self.relations[name]]
-        steady = sum(abs(one - lag) <= CLOCK_TOLERANCE for one in each) >= SHARED_FRACTION * len(
-            each
-        )
-        is_sure = steady and abs(lag) >= OFFSET_ERROR
-        return self._finding("clock_offset", channel, text, "error" if is_sure else "warning")
+        near = sum(abs(one - lag) <= CLOCK_TOLERANCE for one in each)
+        is_sure = near >= SHARED_FRACTION * len(each) and abs(lag) >= OFFSET_ERROR
+        severity: Severity = "error" if is_sure else "warning"
+        return Finding("clock_offset", self.name, channel, text, severity)
 
 
 def _varies(recording: Recording, name: str) -> bool:
     """Return whether a channel is recorded and not constant."""
     channel = recording.channels.get(name)
     return channel is not None and len(set(channel.values)) > 1
-
-
-def _unit_error_reason(
-    size: float, dimension: Dimension, tolerance: float = FACTOR_TOLERANCE
-) -> str:
-    """Return the unit error that explains a ratio of measured to simulated, or an empty text."""
-    near = [
-        (abs(math.log(size / factor)), reason)
-        for factor, unit, reason in UNIT_FACTORS
-        if not unit or are_compatible(parse_unit(unit).dimension, dimension)
-    ]
-    distance, reason = min(near)
-    return reason if distance < math.log(1.0 + tolerance) else ""

@@ -20,6 +20,7 @@ from diagnosis.model.placed_effect import (
     DISTURBANCE_STATE,
     PlacedEffect,
     automaton_with_effects,
+    effect_names,
     lower_tunable_program,
     minimum_substeps,
 )
@@ -27,7 +28,6 @@ from language.expressions.syntax_tree import Name, names
 from language.lowering.delay_buffers import memory_calls_by_key
 from language.model.automaton import Automaton
 from language.model.declaration import Formula, Parameter
-from language.overlays.effect_reader import added_names
 from language.overlays.expand_document import Project
 from language.text.document import Document
 
@@ -81,9 +81,8 @@ class Candidate:
 
     def calibration_page(self, values: Mapping[str, float], series: SampledRecording) -> Reals:
         """Return the calibration page (tunables,) of `values` [SI] for one recording."""
-        return np.asarray(
-            self.calibration_pages([values], series.first_measured[np.newaxis])[0], dtype=np.float64
-        )
+        page: Reals = self.calibration_pages([values], series.first_measured[np.newaxis])[0]
+        return page
 
     def calibration_pages(
         self, values: Sequence[Mapping[str, float]], first_measured: Reals
@@ -94,34 +93,25 @@ class Candidate:
         values of compared states; a NaN keeps the value of the page.
         """
         is_shared = all(own is values[0] for own in values)
-        rows = [
-            list({**self._default_page, **own}.values())
-            for own in (values[:1] if is_shared else values)
-        ]
-        width = len(self._default_page)
-        pages = np.array([row[:width] for row in rows])
+        defaults = self.predictor.page
+        pages = np.array(
+            [
+                list({**defaults, **own}.values())[: len(defaults)]
+                for own in (values[:1] if is_shared else values)
+            ]
+        )
         pages = np.repeat(pages, len(values), axis=0) if is_shared else pages
         columns, places = self._initial_value_columns
         initial_values = first_measured[:, columns]
-        known = np.isfinite(initial_values)
-        pages[:, places] = (
-            initial_values if known.all() else np.where(known, initial_values, pages[:, places])
-        )
+        pages[:, places] = np.where(np.isfinite(initial_values), initial_values, pages[:, places])
         return pages
-
-    @cached_property
-    def _default_page(self) -> dict[str, float]:
-        """The default value of each tunable by name, in the order of the page."""
-        return dict(self.predictor.page)
 
     @cached_property
     def _initial_value_columns(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """The indices of outputs that are states, and of their initial values in the page."""
         places = {name: place for place, name in enumerate(self.predictor.page)}
-        fresh = [
-            (k, INITIAL_VALUE_NAME.format(name)) for k, name in enumerate(self.predictor.outputs)
-        ]
-        known = [(k, places[name]) for k, name in fresh if name in places]
+        fresh = [INITIAL_VALUE_NAME.format(name) for name in self.predictor.outputs]
+        known = [(k, places[name]) for k, name in enumerate(fresh) if name in places]
         columns, starts = np.array(known, dtype=np.intp).reshape(-1, 2).T
         return columns, starts
 
@@ -141,9 +131,7 @@ def compile_candidate(
     """
     all_layers = [*placed_effects, *disturbances]
     parts = [
-        f"{placed_effect.id} {placed_effect.suffix} {placed_effect.scales} "
-        f"{node_text(placed_effect.effect.body)}"
-        for placed_effect in all_layers
+        f"{one.id} {one.suffix} {one.scales} {node_text(one.effect.body)}" for one in all_layers
     ]
     counts = f"{len(placed_effects)} effects, {len(disturbances)} disturbances"
     key = cache_key(node_text(document.root), counts, *parts, *output_names, str(period))
@@ -164,17 +152,11 @@ def _compile(
     period: Fraction,
 ) -> tuple[CompiledModel, bytes]:
     """Return the metadata and the shared library of an automaton with its effects, built now."""
-    effect_parameters = [
-        placed_effect.qualified_name(name)
-        for placed_effect in placed_effects
-        for name in added_names(placed_effect.effect.body)
-    ]
+    effect_parameters = [name for one in placed_effects for name in effect_names(one)]
     uncertain = free_parameters_of(automaton, effect_parameters)
     with_initial_values = _with_tunable_initial_values(automaton, output_names)
-    initial_value_names = [
-        name for name in with_initial_values.parameters if name not in automaton.parameters
-    ]
-    names = [*(one.name for one in uncertain), *initial_value_names]
+    added = [name for name in with_initial_values.parameters if name not in automaton.parameters]
+    names = [*(one.name for one in uncertain), *added]
     min_count = minimum_substeps(automaton, placed_effects, output_names, period)
     program, substeps = lower_tunable_program(
         with_initial_values, names, effect_parameters, period, min_count
@@ -186,10 +168,10 @@ def _compile(
         substeps,
         tuple(float(r[1] - r[0]) if r else 1.0 for r in ranges),
         uncertain,
-        tuple(placed_effect.qualified_name(DISTURBANCE_STATE) for placed_effect in disturbances),
+        tuple(one.qualified_name(DISTURBANCE_STATE) for one in disturbances),
         tuple(
-            float(automaton.parameters[placed_effect.qualified_name("memory")].value or 1)
-            for placed_effect in disturbances
+            float(automaton.parameters[one.qualified_name("memory")].value or 1)
+            for one in disturbances
         ),
         _delay_parameters(automaton),
         tuple(name in effect_parameters for name in columns.states),

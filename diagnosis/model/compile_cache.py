@@ -12,12 +12,11 @@ import hashlib
 import json
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import codegen
@@ -120,41 +119,27 @@ def code_digest(patterns: tuple[str, ...] = ("*",)) -> str:
 
     It covers `language`, `codegen` and the files of `diagnosis` whose stem matches a pattern.
     """
-    digest = hashlib.sha256()
+    searched = [(language, "*"), (codegen, "*"), *((diagnosis, pattern) for pattern in patterns)]
     files = [
-        file for package in (language, codegen) for file in _source_files(_package_folder(package))
+        file
+        for package, pattern in searched
+        for ending in ("py", "jinja", "yaml", "lark")
+        for file in Path(str(package.__file__)).parent.glob(f"**/{pattern}.{ending}")
     ]
-    files += [file for name in patterns for file in _source_files(_package_folder(diagnosis), name)]
+    digest = hashlib.sha256()
     for path in sorted(files):
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
 
 
-def _package_folder(package: ModuleType) -> Path:
-    """Return the folder of a package."""
-    return Path(str(package.__file__)).parent
-
-
-def _source_files(folder: Path, name: str = "*") -> Iterator[Path]:
-    """Yield the source files below a folder with a stem like `name`."""
-    for ending in ("py", "jinja", "yaml", "lark"):
-        yield from folder.glob(f"**/{name}.{ending}")
-
-
 def _from_json(data: dict[str, Any]) -> CompiledModel:
     """Return the metadata that a JSON object of the cache holds."""
-    given: dict[str, Any] = data["columns"]
-    columns: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
-    free_parameters = tuple(
-        FreeParameter(**{**one, "starts": tuple(one["starts"])}) for one in data["free_parameters"]
-    )
-    return CompiledModel(
-        PredictorColumns(**columns),
-        int(data["substeps"]),
-        tuple(data["state_ranges"]),
-        free_parameters,
-        tuple(data["disturbance_states"]),
-        tuple(data["memories"]),
-        tuple(data["delays"]),
-        tuple(data["is_effect_state"]),
-    )
+    free_parameters = tuple(FreeParameter(**_with_tuples(one)) for one in data["free_parameters"])
+    columns = PredictorColumns(**_with_tuples(data["columns"]))
+    given = {**_with_tuples(data), "columns": columns, "free_parameters": free_parameters}
+    return CompiledModel(**given)
+
+
+def _with_tuples(data: dict[str, Any]) -> dict[str, Any]:
+    """Return a JSON object with tuples in place of lists."""
+    return {key: tuple(one) if isinstance(one, list) else one for key, one in data.items()}

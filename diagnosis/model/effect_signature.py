@@ -105,11 +105,8 @@ def _default_step(base: Automaton, placed_effect: PlacedEffect) -> tuple[str, st
     if not base.inputs:
         raise ValueError(f"`{base.name}` has no input to step")
     free = [name for name, one in base.inputs.items() if one.default is None]
-    name = (
-        placed_effect.place
-        if placed_effect.place in base.inputs
-        else next(iter([*free, *base.inputs]))
-    )
+    is_input = placed_effect.place in base.inputs
+    name = placed_effect.place if is_input else [*free, *base.inputs][0]
     unit = format_si_unit(base.inputs[name].unit.dimension)
     return name, f"{DEFAULT_STEP_HEIGHTS.get(unit, '1')} {unit}"
 
@@ -154,26 +151,21 @@ def _simulate(automaton: Automaton, project: Project, text: str) -> Trajectory:
 
 def draw_signature(signature: Signature) -> Picture:
     """Draw both simulations of the first `MAX_OUTPUTS` (4) signals with their difference below."""
-    names = [
-        name
-        for name in signature.without_effect.signals
-        if name not in signature.without_effect.modes
-    ]
-    names = names[:MAX_OUTPUTS]
+    one, other = signature.without_effect, signature.with_effect
+    names = [name for name in one.signals if name not in one.modes][:MAX_OUTPUTS]
     figure = Figure(figsize=(8.5, 1.0 + 2.1 * len(names)), layout="constrained")
     rows = figure.subplots(
         2 * len(names), 1, sharex=True, squeeze=False, height_ratios=[1.7, 1.0] * len(names)
     )
     for k, name in enumerate(names):
         above, beneath = rows[2 * k][0], rows[2 * k + 1][0]
-        one, other = signature.without_effect, signature.with_effect
         above.plot(one.times, one.signals[name], "--", color=RED, lw=1.2, label="without")
         above.plot(other.times, other.signals[name], color=BLUE, lw=1.2, label="with the effect")
         count = min(len(one.times), len(other.times))
         change = np.asarray(other.signals[name][:count], float) - one.signals[name][:count]
         beneath.plot(one.times[:count], change, color=BLUE, lw=1.1)
         beneath.axhline(0.0, color="black", lw=0.6)
-        label = f"{name.partition('.')[2] or name} [{signature.without_effect.units[name]}]"
+        label = f"{name.partition('.')[2] or name} [{one.units[name]}]"
         above.set_ylabel(label, fontsize=9, parse_math=False)
         beneath.set_ylabel("change", fontsize=9)
         for axis in (above, beneath):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 from language.expressions.parser import parse_expression
 from language.lowering.constants import evaluate_exactly
@@ -21,8 +22,7 @@ from language.text.document import ScalarNode
 PRIOR_STD = 0.15
 """Prior standard deviation of a base parameter: of its logarithm, or as a fraction of its range."""
 NEUTRAL_OFFSET = 0.02
-"""The first start of an effect parameter lies at this fraction of the way from neutral to the next.
-"""
+"""Distance from neutral to the first start of an effect parameter over that to the next start."""
 EFFECT_PRIOR_STD = 0.5
 """Prior standard deviation of an effect parameter, as a fraction of its range."""
 
@@ -88,25 +88,28 @@ def _base_parameter(parameter: Parameter) -> FreeParameter:
     if low >= 0.0 and value > 0.0:
         low = low if low > 0.0 else 1e-3 * value
         return FreeParameter(parameter.name, value, low, high, PRIOR_STD, True, unit=unit)
-    return FreeParameter(
-        parameter.name, value, low, high, PRIOR_STD * (high - low), False, unit=unit
-    )
+    spread = PRIOR_STD * (high - low)
+    return FreeParameter(parameter.name, value, low, high, spread, False, unit=unit)
 
 
 def _effect_parameter(parameter: Parameter) -> FreeParameter:
     """Return an effect parameter as a free one: logarithmic if its range and value are positive."""
     assert parameter.range and parameter.value is not None
     low, high = (float(end) for end in parameter.range)
-    fitting = parameter.fitting
-    value = float(parameter.value)
-    starts = _start_values(parameter, value)
-    each = fitting.per == "recording"
-    place = (parameter.name, value, low, high)
-    unit = si_unit(parameter)
-    if low > 0.0 and value > 0.0:
-        sd = EFFECT_PRIOR_STD * math.log(high / low)
-        return FreeParameter(*place, sd, True, each, starts, unit, fitting.form == "order")
-    return FreeParameter(*place, EFFECT_PRIOR_STD * (high - low), False, each, starts, unit)
+    fitting, value = parameter.fitting, float(parameter.value)
+    is_log = low > 0.0 and value > 0.0
+    return FreeParameter(
+        parameter.name,
+        value,
+        low,
+        high,
+        EFFECT_PRIOR_STD * (math.log(high / low) if is_log else high - low),
+        is_log,
+        fitting.per == "recording",
+        _start_values(parameter, value),
+        si_unit(parameter),
+        is_log and fitting.form == "order",
+    )
 
 
 def _start_values(parameter: Parameter, value: float) -> tuple[float, ...]:
@@ -137,3 +140,14 @@ def declared_value(automaton: Automaton, text: str) -> float | None:
         return float(evaluate_exactly(Formula(parse_expression(scalar), text), automaton))
     except SpecError:
         return None
+
+
+def format_value(value: float, parameter: Parameter) -> str:
+    """Return a value [SI] as `0.12 kg*m^2`, with six digits unless these are outside its range."""
+    text = f"{value:.6g}"
+    if parameter.range:
+        low, high = parameter.range
+        if not low <= Fraction(text) <= high:
+            text = repr(min(max(value, float(low)), float(high)))
+    unit = si_unit(parameter)
+    return text if unit == "1" else f"{text} {unit}"

@@ -42,10 +42,10 @@ def vector_of(candidate: Candidate, recordings: int, start: Mapping[str, float])
 
     Parameters not in `start` have their first start value, or else their declared value.
     """
-    shared = []
-    for one in candidate.free_parameters:
-        value = start.get(one.name, one.starts[0] if one.starts else one.start)
-        shared.append(one.coordinate(value))
+    shared = [
+        one.coordinate(start.get(one.name, one.starts[0] if one.starts else one.start))
+        for one in candidate.free_parameters
+    ]
     bounds = bounds_of(candidate)
     z = np.clip(np.array(shared, dtype=float), bounds[:, 0], bounds[:, 1])
     return ParameterVector(z, np.tile(z, (recordings, 1)))
@@ -61,11 +61,9 @@ def extend_vector(
 
     Other parameters are at `start`: values [SI] as in `vector_of`, or a vector of the candidate.
     """
-    point = (
-        start
-        if isinstance(start, ParameterVector)
-        else vector_of(candidate, len(base_point.per_recording), start)
-    )
+    point = start
+    if not isinstance(point, ParameterVector):
+        point = vector_of(candidate, len(base_point.per_recording), point)
     point = ParameterVector(point.shared.copy(), point.per_recording.copy())
     names = candidate.names
     for k, name in enumerate(base.names):

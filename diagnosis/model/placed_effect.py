@@ -41,6 +41,7 @@ PLACE_KIND_BY_SECTION = {
     "outputs": "output",
 }
 """The kind of place that the names of a section denote."""
+SECTION_BY_PLACE_KIND = {kind: section for section, kind in PLACE_KIND_BY_SECTION.items()}
 
 MAX_STEP = Fraction(5, 1000)
 """Longest major step [s] of a prediction; events inside a step are located."""
@@ -49,8 +50,7 @@ PARAMETER_FACTOR = Fraction(4)
 """Factor by which an effect's parameter may change in a fit, for the choice of a stable step."""
 
 MIN_DELAY_STEPS = 4
-"""Fewest major steps between two samples of a model with a delay, which is at least one step long.
-"""
+"""Fewest major steps between samples of a model with a delay, which is at least one step long."""
 
 MAX_ANGLE_STEP = Fraction(1, 1000)
 """Longest major step [s] of a model with an effect at an input that depends on an angle.
@@ -112,12 +112,11 @@ def disturbance_effect(kind: str, place: str) -> PlacedEffect:
 def find_placements(document: Document, effect: Effect) -> tuple[PlacedEffect, ...]:
     """Return an effect at every place of an expanded automaton that matches its patterns."""
     root, kinds = document.root, {fit.kind for fit in effect.place_patterns}
-    names = [
-        name
+    return tuple(
+        PlacedEffect(effect, name, name)
         for name, own in _place_kinds(document).items()
         if own & kinds and not isinstance(find_effect_place(root, effect, name), PlaceMismatch)
-    ]
-    return tuple(PlacedEffect(effect, name, name) for name in names)
+    )
 
 
 def overlay_effects(document: Document, placed_effects: Sequence[PlacedEffect]) -> Document:
@@ -126,15 +125,8 @@ def overlay_effects(document: Document, placed_effects: Sequence[PlacedEffect]) 
     root = document.root
     span = Span(Source("diagnosis"), 1, 1)
     for placed_effect in placed_effects:
-        application = EffectApplication(
-            placed_effect.effect,
-            placed_effect.place,
-            placed_effect.suffix,
-            {},
-            {},
-            span,
-            placed_effect.scales,
-        )
+        names = placed_effect.effect, placed_effect.place, placed_effect.suffix
+        application = EffectApplication(*names, {}, {}, span, placed_effect.scales)
         root = apply_effect(root, application, problems)
         problems.raise_if_errors()
     return dataclasses.replace(document, root=root)
@@ -200,15 +192,11 @@ def minimum_substeps(
     there are `MIN_DELAY_STEPS` (4) with a delay or direct feed-through (an output is constant
     within a step).
     """
-    at_input = any(
-        placed_effect.effect.place_patterns[0].kind == "input" for placed_effect in placed_effects
-    )
-    if at_input and uses_function(automaton, "floor"):
+    is_at_input = any(one.effect.place_patterns[0].kind == "input" for one in placed_effects)
+    if is_at_input and uses_function(automaton, "floor"):
         return int(-(-period // MAX_ANGLE_STEP))
-    is_short = memory_calls_by_key(automaton, ("delay",)) or has_feedthrough(
-        automaton, output_names
-    )
-    return MIN_DELAY_STEPS if is_short else 1
+    has_delay = bool(memory_calls_by_key(automaton, ("delay",)))
+    return MIN_DELAY_STEPS if has_delay or has_feedthrough(automaton, output_names) else 1
 
 
 def _scale_parameters(automaton: Automaton, names: Sequence[str], factor: Fraction) -> Automaton:
@@ -237,14 +225,6 @@ def _place_kinds(document: Document) -> dict[str, set[str]]:
     return found
 
 
-SECTION_BY_PLACE_KIND = {
-    "balance": "flow",
-    "input": "inputs",
-    "output": "outputs",
-    "element": "elements",
-}
-
-
 def place_path(placed_effect: PlacedEffect) -> str:
     """Return `section.name` of the place of an effect, by its first place pattern."""
     kind = placed_effect.effect.place_patterns[0].kind
@@ -253,6 +233,5 @@ def place_path(placed_effect: PlacedEffect) -> str:
 
 def effect_names(placed_effect: PlacedEffect) -> dict[str, str]:
     """Return the names that an effect adds to the automaton, mapped to their names in its file."""
-    return {
-        placed_effect.qualified_name(name): name for name in added_names(placed_effect.effect.body)
-    }
+    names = added_names(placed_effect.effect.body)
+    return {placed_effect.qualified_name(name): name for name in names}

@@ -41,8 +41,7 @@ from diagnosis.result.verdict import DecisionOutcome, NamedEffect, RankedCandida
 from diagnosis.selection.candidate_search import CandidateFit
 from diagnosis.selection.forward_selection import Selection
 from diagnosis.selection.intersample import LogCallback
-from diagnosis.validation.free_simulation import compare_misfits
-from diagnosis.validation.misfit import Misfit
+from diagnosis.validation.free_simulation import Misfit, compare_misfits
 from diagnosis.validation.oscillation import Oscillation, analyse_oscillation
 from engine.recordings.recording_window import paths_overlap, strip_window_suffix
 from language.loading.load import automaton_of

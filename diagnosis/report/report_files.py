@@ -14,7 +14,7 @@ from codegen.toolchain.compiler import BuildError, compiler_version
 from codegen.toolchain.templates import product_version, render_html
 from diagnosis.data_quality.finding import format_findings
 from diagnosis.model.compile_cache import node_text
-from diagnosis.model.equation_change import equation_changes
+from diagnosis.model.effect_library import equation_changes
 from diagnosis.model.placed_effect import shipped_effects
 from diagnosis.report import report_text as sentences, tables
 from diagnosis.report.diagnosis_report import DiagnosisReport, verdict_to_json

@@ -15,7 +15,7 @@ from diagnosis.result.effect_naming import verdict_id
 from diagnosis.result.verdict import NamedEffect
 from diagnosis.selection.candidate_search import MIN_SCREENING_GAIN, CandidateFit
 from diagnosis.selection.forward_selection import Selection
-from diagnosis.validation.misfit import Misfit
+from diagnosis.validation.free_simulation import Misfit
 
 MAX_NAMED = 4
 """Maximum number of rivals, windows or findings in a sentence."""

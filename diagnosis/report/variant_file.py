@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from codegen.toolchain.templates import product_version
 from diagnosis.estimation.covariance import quantities_of
 from diagnosis.estimation.quantity import Quantity
-from diagnosis.model.parameter_text import format_value
+from diagnosis.model.parameter import format_value
 from diagnosis.model.placed_effect import automaton_with_effects
 from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.report_text import format_two_digits

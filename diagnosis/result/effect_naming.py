@@ -17,27 +17,22 @@ VERDICT_ALIASES = {
 
 def verdict_id(placed_effect: PlacedEffect, automaton: Automaton) -> str:
     """Return the name of an effect in a verdict, which may be a key of `VERDICT_ALIASES`."""
-    element = automaton.elements.get(placed_effect.place)
-    if element is not None and placed_effect.effect.name == "backlash" and "gap" in element.parts:
+    element, name = automaton.elements.get(placed_effect.place), placed_effect.effect.name
+    if element is not None and name == "backlash" and "gap" in element.parts:
         return "second_gap"
-    if (
-        element is not None
-        and placed_effect.effect.name == "compliance"
-        and element.kind == "inertia"
-    ):
+    if element is not None and name == "compliance" and element.kind == "inertia":
         return "added_inertia"
-    return placed_effect.effect.name
+    return name
 
 
 def named_effect_of(
     placed_effect: PlacedEffect, model: Estimate, automaton: Automaton
 ) -> NamedEffect:
     """Return an effect with its fitted parameters, under their names in the effect file."""
-    quantities = quantities_of(model)
     original_names = effect_names(placed_effect)
     own = {
         original_names[name]: quantity
-        for name, quantity in quantities.items()
+        for name, quantity in quantities_of(model).items()
         if name in original_names and name not in automaton.parameters
     }
     return NamedEffect(verdict_id(placed_effect, automaton), place_path(placed_effect), own)

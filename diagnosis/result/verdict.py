@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from diagnosis.estimation.quantity import Quantity
 from diagnosis.localisation.location import Location
-from diagnosis.validation.misfit import Misfit
+from diagnosis.validation.free_simulation import Misfit
 
 FORMAT = "modewright-verdict/1"
 
@@ -58,24 +58,13 @@ class Verdict:
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of `verdict.json`, with the locations that gain or are accepted."""
-        locations = [
-            location for location in self.location if location.gain > 0.0 or location.is_accepted
-        ]
+        locations = [one for one in self.location if one.gain > 0.0 or one.is_accepted]
         worst = locations[0] if locations else None
         return {
             "format": FORMAT,
             "verdict": self.verdict,
-            "effects": [_effect_to_json(one) for one in self.effects],
-            "candidates": [
-                {
-                    "id": one.id,
-                    "place": one.place,
-                    "probability": one.probability,
-                    "train_gain": one.train_gain,
-                    "std": one.std,
-                }
-                for one in self.candidates
-            ],
+            "effects": [dataclasses.asdict(one) for one in self.effects],
+            "candidates": [dataclasses.asdict(one) for one in self.candidates],
             "other": self.other,
             "ambiguous_with": [{"id": one.id, "place": one.place} for one in self.ambiguous_with],
             "location": {
@@ -89,7 +78,7 @@ class Verdict:
                 for part, signals in self.fit.items()
             },
             "base": {
-                name: {"before": _quantity_to_json(before), "after": _quantity_to_json(after)}
+                name: {"before": dataclasses.asdict(before), "after": dataclasses.asdict(after)}
                 for name, (before, after) in self.base.items()
             },
             "confirmed": self.confirmed,
@@ -97,17 +86,3 @@ class Verdict:
             "inputs": dict(self.inputs),
             "runtime_s": self.runtime_s,
         }
-
-
-def _effect_to_json(effect: NamedEffect) -> dict[str, Any]:
-    """Return an effect as a JSON object."""
-    return {
-        "id": effect.id,
-        "place": effect.place,
-        "parameters": {name: _quantity_to_json(q) for name, q in effect.parameters.items()},
-    }
-
-
-def _quantity_to_json(quantity: Quantity) -> dict[str, Any]:
-    """Return a quantity as a JSON object."""
-    return {"value": quantity.value, "unit": quantity.unit, "std": quantity.std}

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,6 @@ from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.data.stacked_recordings import burn_in_samples
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.innovations import predict
-from diagnosis.validation.misfit import Misfit
 
 OBSERVED_TIME = 5.0
 """Reference times of a recording with corrections by the observer."""
@@ -78,18 +78,14 @@ def simulate_free(model: Estimate, series: Sequence[SampledRecording]) -> list[R
 
     Samples after a run diverged are NaN.
     """
+    measured = [np.where(is_free(one)[:, None], np.nan, one.measured) for one in series]
     masked = [
-        dataclasses.replace(one, measured=np.where(is_free(one)[:, None], np.nan, one.measured))
-        for one in series
+        dataclasses.replace(one, measured=np.ascontiguousarray(known))
+        for one, known in zip(series, measured, strict=True)
     ]
     values = [model.values(k) for k in range(len(series))]
-    masked = [
-        dataclasses.replace(one, measured=np.ascontiguousarray(one.measured)) for one in masked
-    ]
-    prediction = predict(
-        model.candidate, masked, values, model.gains, model.noise_levels.huber_limits
-    )
-    return [p.outputs for p in prediction.predictions]
+    run = predict(model.candidate, masked, values, model.gains, model.noise_levels.huber_limits)
+    return [one.outputs for one in run.predictions]
 
 
 def is_after_burn_in(series: SampledRecording) -> NDArray[np.bool_]:
@@ -101,3 +97,13 @@ def is_free(series: SampledRecording) -> NDArray[np.bool_]:
     """Return the mask (samples,) of the last `FREE_TIME` of each `WINDOW_TIME`."""
     observed, whole = series.sample_count(OBSERVED_TIME), series.sample_count(WINDOW_TIME)
     return np.asarray(np.mod(np.arange(series.count), whole) >= observed)
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """Errors of free simulation before and after, over the signal's deviation and in SI."""
+
+    nrmse_before: float
+    nrmse_after: float
+    rmse_before: float
+    rmse_after: float

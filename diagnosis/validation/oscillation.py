@@ -56,10 +56,8 @@ class Cycles:
     def frequency_trend(self) -> float:
         """Return the mean frequency of small cycles over that of large ones, minus 1, or NaN."""
         part = self.amplitudes / max(float(np.max(self.amplitudes, initial=0.0)), 1e-300)
-        large, little = (
-            self.frequencies[part > LARGE_AMPLITUDE],
-            self.frequencies[part < SMALL_AMPLITUDE],
-        )
+        large = self.frequencies[part > LARGE_AMPLITUDE]
+        little = self.frequencies[part < SMALL_AMPLITUDE]
         if not len(large) or not len(little):
             return float("nan")
         return float(np.mean(little) / np.mean(large) - 1.0)
