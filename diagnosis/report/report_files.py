@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -51,12 +51,9 @@ def provenance_rows(report: DiagnosisReport) -> list[tuple[str, str, str]]:
     effects = case.effects if case.effects is not None else shipped_effects()
     library = "\n".join(f"{one.name} {node_text(one.body)}" for one in effects)
     columns = "\n".join(case.mapping.span.source.lines)
+    spec = _text_digest(node_text(case.document.root))
     found = [
-        (
-            "spec, with all that it extends",
-            report.name,
-            _text_digest(node_text(case.document.root)),
-        ),
+        ("spec, with all that it extends", report.name, spec),
         ("map of columns", case.mapping.name, _text_digest(columns) if columns else ""),
         ("effects", f"{len(effects)} of them", _text_digest(library)),
     ]
@@ -104,12 +101,15 @@ def report_files(report: DiagnosisReport, variant: str, folder: Path = Path()) -
         **_verdict_context(report, comparisons),
         **_model_context(report, comparisons),
         **_data_context(report),
-        **_usage_context(report, folder),
+        "commands": reproduction_commands(report, folder),
+        "made_by": report_command(report, folder),
+        "tools": tool_versions(),
+        "sources": provenance_rows(report),
         "variant": variant,
         "drawings": {one.name: one for one in figures},
         "svg": svg,
     }
-    files["report.html"] = _render_page(context).encode()
+    files["report.html"] = render_html((REPORT,), "report.html.jinja", context).encode()
     verdict = json.dumps(verdict_to_json(report.verdict), indent=2, allow_nan=False) + "\n"
     files["verdict.json"] = verdict.encode()
     return files
@@ -189,18 +189,3 @@ def _data_context(report: DiagnosisReport) -> dict[str, Any]:
         "fixed": format_fixed_parameters(report),
         "thresholds": report.case.thresholds,
     }
-
-
-def _usage_context(report: DiagnosisReport, folder: Path) -> dict[str, Any]:
-    """Return the values of the template for commands and provenance."""
-    return {
-        "commands": reproduction_commands(report, folder),
-        "made_by": report_command(report, folder),
-        "tools": tool_versions(),
-        "sources": provenance_rows(report),
-    }
-
-
-def _render_page(context: Mapping[str, Any]) -> str:
-    """Return the HTML page for the values of the template."""
-    return render_html((REPORT,), "report.html.jinja", context)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from diagnosis.criterion.threshold import Thresholds
 from diagnosis.data_quality.finding import format_findings
-from diagnosis.estimation.quantity import Quantity
 from diagnosis.localisation.location_text import PLACE_PHRASES, format_location
 from diagnosis.model.placed_effect import PlacedEffect, place_path
 from diagnosis.report.diagnosis_report import DiagnosisReport
@@ -69,15 +68,8 @@ def format_effect(effect: NamedEffect) -> str:
 
 def _format_effect_values(effect: NamedEffect) -> str:
     """Return an effect with its place and parameter values."""
-    values = ", ".join(
-        f"{name} = {format_fitted_quantity(q)}" for name, q in effect.parameters.items()
-    )
+    values = ", ".join(f"{name} = {format_quantity(q)}" for name, q in effect.parameters.items())
     return f"{format_effect(effect)} ({values})" if values else format_effect(effect)
-
-
-def format_fitted_quantity(fitted: Quantity) -> str:
-    """Return a value with its standard deviation and unit, by `format_quantity`."""
-    return format_quantity(fitted)
 
 
 def format_two_digits(value: float) -> str:
@@ -87,10 +79,9 @@ def format_two_digits(value: float) -> str:
 
 def format_improvement(report: DiagnosisReport) -> str:
     """Return the misfits before and after and the confirmation in one line; "" without any."""
-    fit = report.verdict.fit
     parts = [
         f"{name.replace('_', ' ')}: {_format_misfits(signals)}"
-        for name, signals in fit.items()
+        for name, signals in report.verdict.fit.items()
         if signals
     ]
     if not parts:
@@ -121,14 +112,14 @@ def format_separation(report: DiagnosisReport) -> list[str]:
     if report.diagnosis is None:
         return []
     selection = report.diagnosis.selection
-    lines = [format_experiment(report)] if format_experiment(report) else []
+    lines = [format_experiment(report)]
     for tried in (*selection.accepted, *selection.rivals):
         effect = tried.placed_effect.effect
         if effect.separated_by and effect.confused_with:
             name = verdict_id(tried.placed_effect, report.automaton)
             others = ", ".join(effect.confused_with)
             lines.append(f"{name} from {others}: {'; '.join(effect.separated_by)}")
-    return lines
+    return [line for line in lines if line]
 
 
 def format_oscillation(report: DiagnosisReport) -> str:
@@ -138,12 +129,8 @@ def format_oscillation(report: DiagnosisReport) -> str:
         return ""
     text = found[0].format_sentence()
     if len(found) > 1:
-        after = found[1]
-        end = (
-            "to the end"
-            if after.followed_time >= after.length
-            else f"until t = {after.followed_time:.2f} s"
-        )
+        is_whole = found[1].followed_time >= found[1].length
+        end = "to the end" if is_whole else f"until t = {found[1].followed_time:.2f} s"
         text += f"; with what was found it fits {end}"
     return text
 
@@ -158,14 +145,14 @@ def format_reason(
     candidate_fit: CandidateFit, rank: int, selection: Selection, thresholds: Thresholds
 ) -> str:
     """Return why a candidate was accepted or not; `rank` is its index in the table."""
-    ids = {one.placed_effect.id for one in selection.accepted}
-    if candidate_fit.placed_effect.id in ids:
+    own = candidate_fit.placed_effect
+    if own.id in {one.placed_effect.id for one in selection.accepted}:
         return "accepted"
-    if candidate_fit.placed_effect.id in {one.placed_effect.id for one in selection.rivals}:
+    if own.id in {one.placed_effect.id for one in selection.rivals}:
         return "cannot be told from the accepted one"
     if not candidate_fit.is_fitted:
         return f"not fitted: gains less than {MIN_SCREENING_GAIN:g} nats in screening"
-    threshold = thresholds.threshold_of(candidate_fit.placed_effect)
+    threshold = thresholds.threshold_of(own)
     if candidate_fit.gain <= threshold:
         return f"gains less than {threshold:.0f} nats"
     share = f"explains {100.0 * max(candidate_fit.share, 0.0):.0f} % of what is unexplained"
@@ -200,14 +187,8 @@ def _format_caveat(report: DiagnosisReport) -> str:
         more = f" (and {len(worst) - 1} more)" if len(worst) > 1 else ""
         return f"recordings: {worst[0][1]}{more}"
     verdict = report.verdict
-    if verdict.verdict == "effect" and verdict.ambiguous_with:
-        return (
-            f"nearly as good: {_join_first([format_effect(one) for one in verdict.ambiguous_with])}"
-        )
+    names = [format_effect(one) for one in verdict.ambiguous_with]
+    if verdict.verdict == "effect" and names:
+        more = f" and {len(names) - MAX_NAMED} more" if len(names) > MAX_NAMED else ""
+        return f"nearly as good: {', '.join(names[:MAX_NAMED])}{more}"
     return ""
-
-
-def _join_first(names: Sequence[str]) -> str:
-    """Return the first names, and how many more there are."""
-    more = f" and {len(names) - MAX_NAMED} more" if len(names) > MAX_NAMED else ""
-    return ", ".join(names[:MAX_NAMED]) + more

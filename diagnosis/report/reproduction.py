@@ -27,14 +27,10 @@ def format_window_csv(window: WorstWindow, inputs: Mapping[str, str]) -> str:
     names += [f"{name}_{word}" for word in ("without", "with") for name in seen]
     parts = (window.times[:, None], window.inputs, window.measured, window.before, window.after)
     rows = [
-        ",".join(_format_value(value) for value in row) for row in np.concatenate(parts, axis=1)
+        ",".join(f"{value:.9g}" if math.isfinite(value) else "" for value in row)
+        for row in np.concatenate(parts, axis=1)
     ]
     return "\n".join([",".join(names), *rows]) + "\n"
-
-
-def _format_value(value: float) -> str:
-    """Return a number with nine digits; "" if it is not finite."""
-    return f"{value:.9g}" if math.isfinite(value) else ""
 
 
 def format_scenario(report: DiagnosisReport, window: WorstWindow) -> str:
@@ -54,11 +50,8 @@ def format_scenario(report: DiagnosisReport, window: WorstWindow) -> str:
         f"  file: {WINDOW}",
         "  time: {column: t_s, unit: s}",
         "  columns:",
-        *(
-            f"    {name}: {{to: {name}, unit: {unit}, hold: previous}}"
-            for name, unit in fed.items()
-        ),
     ]
+    lines += [f"    {n}: {{to: {n}, unit: {unit}, hold: previous}}" for n, unit in fed.items()]
     starts = []
     for name, unit in zip(window.signals, window.units, strict=True):
         lines.append(f"    {name}: {{compare: {name}, unit: {unit}, blank: skip}}")

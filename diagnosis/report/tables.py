@@ -59,10 +59,8 @@ def misfit_rows(report: DiagnosisReport, label: str, dataset: str, runs: FreeRun
         pairs = zip(before, after, strict=True)
         cells = tuple(_misfit_cell(float(a), float(b), format_significant) for a, b in pairs)
         rows.append(FitRow(name, label, cells))
-    whole = report.verdict.fit.get(dataset, {})
-    sums = tuple(
-        _misfit_cell(one.nrmse_before, one.nrmse_after, format_percent) for one in whole.values()
-    )
+    whole = report.verdict.fit.get(dataset, {}).values()
+    sums = tuple(_misfit_cell(m.nrmse_before, m.nrmse_after, format_percent) for m in whole)
     return [*rows, FitRow("all together, over the spread of the signal", label, sums, True)]
 
 
@@ -106,31 +104,25 @@ def _candidate_row(
     shares: Mapping[str, float],
 ) -> CandidateRow:
     """Return the row of a candidate at a rank."""
-    share = shares.get(candidate_fit.placed_effect.id)
-    is_accepted = candidate_fit.placed_effect.id in {
-        one.placed_effect.id for one in selection.accepted
-    }
+    own = candidate_fit.placed_effect
+    share = shares.get(own.id)
+    is_accepted = own.id in {one.placed_effect.id for one in selection.accepted}
     reason = sentences.format_reason(candidate_fit, rank, selection, report.case.thresholds)
     if is_accepted and report.verdict.verdict == "ambiguous":
         reason = "best, but not separated from others: applied in the model shown here"
     if is_accepted and report.verdict.verdict == "unknown":
         reason = "a formula, no effect of the library: applied in the model shown here"
-    effect, _, place = sentences.candidate_title(candidate_fit.placed_effect, report).partition("@")
+    effect, _, place = sentences.candidate_title(own, report).partition("@")
     return CandidateRow(
         effect,
         place,
-        _format_nats(candidate_fit.gain),
+        f"{candidate_fit.gain:.0f}" if math.isfinite(candidate_fit.gain) else "diverges",
         f"{100.0 * max(candidate_fit.share, 0.0):.0f} %",
         "" if share is None else format_probability(share),
         100.0 * max(candidate_fit.gain, 0.0) / largest,
         reason,
         is_accepted,
     )
-
-
-def _format_nats(gain: float) -> str:
-    """Return a gain [nats] as an integer, `diverges` if it is not finite."""
-    return f"{gain:.0f}" if math.isfinite(gain) else "diverges"
 
 
 def unfitted_candidates(
@@ -154,17 +146,11 @@ def location_rows(location: Location, max_windows: int = MAX_WINDOWS) -> list[tu
     windows = [f"{file} {start:.2f}-{end:.2f} s" for start, end, file in location.windows]
     more = len(windows) - max_windows
     window_text = ", ".join(windows[:max_windows]) + (f" and {more} more" if more > 0 else "")
-    along = [
-        f"{name} (correlation {r:.2f})"
-        for name, r in location.correlates
-        if abs(r) >= MIN_CORRELATION
-    ]
-    rows = [
-        ("strongest in", window_text),
-        ("by mode", ", ".join(shares)),
-        ("goes along with", ", ".join(along)),
-    ]
-    return [row for row in rows if row[1]]
+    known = [(name, r) for name, r in location.correlates if abs(r) >= MIN_CORRELATION]
+    along = [f"{name} (correlation {r:.2f})" for name, r in known]
+    texts = window_text, ", ".join(shares), ", ".join(along)
+    headings = "strongest in", "by mode", "goes along with"
+    return [row for row in zip(headings, texts, strict=True) if row[1]]
 
 
 def recording_rows(report: DiagnosisReport) -> list[tuple[str, ...]]:
@@ -178,20 +164,11 @@ def recording_rows(report: DiagnosisReport) -> list[tuple[str, ...]]:
         lost = max(one.dropped for one in channels)
         found = [one.severity for one in check.findings if one.recording == name]
         worst = ", ".join(f"{found.count(s)} {s}" for s in ("error", "warning") if s in found)
-        used = "not used" if name in report.unused_recordings else "training"
-        if report.diagnosis is None:
-            used = "not used"
+        is_unused = report.diagnosis is None or name in report.unused_recordings
+        used = "not used" if is_unused else "training"
         rate = "-".join(f"{rate}" for rate in (rates[:1] + rates[1:][-1:]))
-        rows.append(
-            (
-                name,
-                used,
-                f"{length:.1f} s",
-                f"{rate} Hz",
-                format_percent(lost) if lost else "none",
-                worst or "none",
-            )
-        )
+        missing = format_percent(lost) if lost else "none"
+        rows.append((name, used, f"{length:.1f} s", f"{rate} Hz", missing, worst or "none"))
     return rows
 
 
@@ -206,11 +183,9 @@ def untestable_effects(report: DiagnosisReport) -> list[tuple[str, str]]:
 
 def format_noise(selection: Selection, signals: Sequence[str], units: Sequence[str]) -> str:
     """Return the noise of the recorded signals in the base: `w 0.12 rad/s, T 3.0 N*m`."""
-    noise = selection.base.noise_levels.outputs
+    noise = [format_significant(float(sd), 2) for sd in selection.base.noise_levels.outputs]
     parts = zip(signals, noise, units, strict=True)
-    return ", ".join(
-        f"{name} {format_significant(float(sd), 2)} {unit}" for name, sd, unit in parts
-    )
+    return ", ".join(f"{name} {sd} {unit}" for name, sd, unit in parts)
 
 
 def split_code_spans(text: str) -> list[tuple[str, bool]]:
@@ -234,17 +209,10 @@ def whiteness_rows(
         for words, found in models:
             one = found[k]
             chance = "< 0.001" if one.p_value < 0.001 else f"{one.p_value:.2g}"
-            rows.append(
-                (
-                    one.signal,
-                    words,
-                    f"{format_significant(one.rms)} {unit}",
-                    format_percent(one.predictable_fraction),
-                    f"{one.lags_outside_band} of {len(one.lags)}",
-                    chance,
-                    one.rating,
-                )
-            )
+            size = f"{format_significant(one.rms)} {unit}"
+            part = format_percent(one.predictable_fraction)
+            outside = f"{one.lags_outside_band} of {len(one.lags)}"
+            rows.append((one.signal, words, size, part, outside, chance, one.rating))
     return rows
 
 
@@ -260,8 +228,7 @@ def describe_residuals(
     found = []
     for old, new in zip(before, after, strict=True):
         was = "" if is_base_only else f" (without {format_percent(old.predictable_fraction)})"
-        detail = (
-            f"{format_percent(new.predictable_fraction)} of it is predictable from its past{was}"
-        )
-        found.append((new.signal, f"{ratings[new.rating]}; {detail}"))
+        part = f"{format_percent(new.predictable_fraction)} of it"
+        text = f"{ratings[new.rating]}; {part} is predictable from its past{was}"
+        found.append((new.signal, text))
     return found

@@ -21,9 +21,7 @@ from language.text.document import MappingNode
 from language.text.node_edit import mapping_entries
 
 NAME_SUFFIX = "_diagnosed"
-
 MAX_NAME_LENGTH = 31
-
 MIN_RELATIVE_CHANGE = 1e-6
 """Relative change below which a parameter is not written."""
 
@@ -56,10 +54,8 @@ def format_variant(report: DiagnosisReport, extends: str) -> str:
 
 def missing_effect_notes(report: DiagnosisReport) -> list[str]:
     """Return a sentence on each of `missing_effects`, which a variant finds by name."""
-    names = [effect.body.span.source.name for effect in missing_effects(report)]
-    return [
-        f"{name} has to be below spec/: the variant finds this effect by name" for name in names
-    ]
+    where = "has to be below spec/: the variant finds this effect by name"
+    return [f"{effect.body.span.source.name} {where}" for effect in missing_effects(report)]
 
 
 def missing_effects(report: DiagnosisReport) -> list[Effect]:
@@ -124,10 +120,8 @@ def _single_effect_lines(
     A parameter per recording has its mean. Multiples of a magnitude that are not fitted are written
     too: a variant has no recordings.
     """
-    placed_effect, own_names = (
-        candidate_fit.placed_effect,
-        added_names(candidate_fit.placed_effect.effect.body),
-    )
+    placed_effect = candidate_fit.placed_effect
+    own_names = added_names(placed_effect.effect.body)
     lines = [f"  {placed_effect.id}:  # {placed_effect.effect.about}"]
     each = [selection.model.values(k) for k in range(len(selection.model.point.per_recording))]
     values = []
