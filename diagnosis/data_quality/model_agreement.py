@@ -111,9 +111,8 @@ def _decimate_inputs(piece: Recording) -> Recording:
         span = channel.times[-1] - channel.times[0]
         every = int(len(channel.times) / (span / Fraction(GRID_STEP))) if span else 1
         if channel.column.to is not None and every > 1:
-            channels[name] = Channel(
-                channel.column, channel.times[::every], channel.values[::every]
-            )
+            part = slice(None, None, every)
+            channels[name] = Channel(channel.column, channel.times[part], channel.values[part])
     return dataclasses.replace(piece, channels=channels)
 
 
@@ -170,9 +169,8 @@ def compare_signals(
     reversed_lag = min(lags, key=lambda lag: correlations[lag])
     if -correlations[reversed_lag] > correlations[best] + REVERSAL_MARGIN:
         best = reversed_lag
-    gains = [
-        _spread_ratio(pair) for pair in (pairs[best], *_low_frequency_rates(comparison, grid, best))
-    ]
+    alike = (pairs[best], *_low_frequency_rates(comparison, grid, best))
+    gains = [_spread_ratio(pair) for pair in alike]
     gain = math.copysign(min(gains, key=lambda g: abs(math.log(g))), correlations[best])
     late = comparison.times > 0.5 * (start + end)
     level = _rms(comparison.measured[late]) / max(_rms(comparison.simulated[late]), 1e-12)
@@ -188,10 +186,9 @@ def _low_frequency_rates(
     kept = (shifted >= grid[0]) & (shifted <= grid[-1])
     if np.count_nonzero(kept) <= _kernel_size(GAIN_SMOOTHING_STD):
         return []
-    y = _smoothed_rate(comparison.times, comparison.measured, shifted[kept], GAIN_SMOOTHING_STD)
-    return [
-        (y, _smoothed_rate(comparison.times, comparison.simulated, grid[kept], GAIN_SMOOTHING_STD))
-    ]
+    times, spread = comparison.times, GAIN_SMOOTHING_STD
+    measured = _smoothed_rate(times, comparison.measured, shifted[kept], spread)
+    return [(measured, _smoothed_rate(times, comparison.simulated, grid[kept], spread))]
 
 
 def _spread_ratio(pair: tuple[Reals, Reals]) -> float:

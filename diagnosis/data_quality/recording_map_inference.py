@@ -1,5 +1,4 @@
-"""Recording map inference: what files without a recording map have, from names and units of
-columns."""
+"""Recording map inference: the map of files without one, from names and units of columns."""
 
 from __future__ import annotations
 
@@ -167,9 +166,8 @@ def _numeric_columns(file: RecordedFile, time: str) -> Iterator[str]:
 
 def _distinct_names(file: RecordedFile, time: str) -> list[str]:
     """Return each name except those of time; the shorter one of two names of a signal."""
-    names = [
-        n for n in dict.fromkeys(file.names) if n != time and not CHANNEL_TIME_NAME.fullmatch(n)
-    ]
+    distinct = dict.fromkeys(file.names)
+    names = [n for n in distinct if n != time and not CHANNEL_TIME_NAME.fullmatch(n)]
     if file.is_stamped:
         names = [n for n in names if n.rpartition(".")[2] == n or n.rpartition(".")[2] not in names]
     return names
@@ -192,8 +190,8 @@ def _find_time_column(file: RecordedFile, problems: Problems) -> str:
 def _is_number(file: RecordedFile, name: str) -> bool:
     """Return whether over 20 % of the cells are finite and few are not finite."""
     values = file.read(name).values
-    number = sum(value is not None and math.isfinite(value) for value in values)
-    bad = sum(value is not None and not math.isfinite(value) for value in values)
+    is_finite = [math.isfinite(value) for value in values if value is not None]
+    number, bad = is_finite.count(True), is_finite.count(False)
     return number > MIN_NUMBER_FRACTION * len(values) and bad <= number // 10
 
 

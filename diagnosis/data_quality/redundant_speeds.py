@@ -57,9 +57,7 @@ def _compare_speeds(
     other = piece.channels.get(second.column.name)
     if one is None or other is None:
         return None
-    start = max(one.seconds[0], other.seconds[0])
-    end = min(one.seconds[-1], other.seconds[-1])
-    inside = (other.seconds >= start) & (other.seconds <= end)
+    inside = (other.seconds >= one.seconds[0]) & (other.seconds <= one.seconds[-1])
     if inside.sum() < 2:
         return None
     times = other.seconds[inside]

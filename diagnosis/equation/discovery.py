@@ -103,7 +103,11 @@ def _propose_formulas(
     options: list[tuple[float, Location, EquationRegression, tuple[TermColumns, ...]]] = []
     places = [one for one in locations if one.gain > 0.0 and not one.is_accepted][:MAX_LOCATIONS]
     for location in places:
-        model = _choose_base(model_set, base, location)
+        point = vector_of(
+            base.candidate, len(model_set.series), _values_beside_disturbance(base, location)
+        )
+        other = evaluate(base.candidate, model_set.series, base.noise_levels, point)
+        model = other if other.cost < base.cost else base
         excess = regression_at(model_set, model, location.section, location.place)
         ranked = rank_terms(excess.problem, excess.columns)
         options += [(gain, location, excess, (one,)) for gain, one in ranked[:MAX_FITS]]
@@ -132,15 +136,6 @@ def _values_beside_disturbance(base: Estimate, location: Location) -> dict[str, 
     return (location.free_model or base).values(0)
 
 
-def _choose_base(model_set: ModelSet, base: Estimate, location: Location) -> Estimate:
-    """Return the cheaper base: with its own parameters or those beside the disturbance."""
-    point = vector_of(
-        base.candidate, len(model_set.series), _values_beside_disturbance(base, location)
-    )
-    other = evaluate(base.candidate, model_set.series, base.noise_levels, point)
-    return other if other.cost < base.cost else base
-
-
 def _fit_formula(
     model_set: ModelSet,
     compared: Round,
@@ -160,11 +155,8 @@ def _fit_formula(
         for k, one in enumerate(candidate.free_parameters):
             if one.name in formula.phases:
                 own[:, k] = [one.coordinate(value) for value in formula.phases[one.name]]
-        starting_fits.append(
-            evaluate(
-                candidate, model_set.series, base.noise_levels, ParameterVector(point.shared, own)
-            )
-        )
+        point = ParameterVector(point.shared, own)
+        starting_fits.append(evaluate(candidate, model_set.series, base.noise_levels, point))
     start = min(starting_fits, key=lambda one: one.cost).point
     estimate = estimate_parameters(candidate, model_set.series, base.noise_levels, start)
     if not np.isfinite(estimate.cost) or estimate.normal_equations is None:

@@ -9,8 +9,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 
@@ -63,8 +61,7 @@ class DisturbanceResponse:
         runs = predictor.predict_points(
             pages[np.newaxis], recorded, self.transient_gains, self.steady_state_gains, substeps
         )
-        edges = pairwise(recorded.starts.tolist())
-        return self._after_burn_in([runs[0][0][low:high] for low, high in edges])
+        return self.after_burn_in(np.split(runs[0][0], recorded.starts[1:-1]))
 
     def _with_disturbance(self, disturbance: Sequence[Reals]) -> tuple[Reals, StackedRecordings]:
         """Return the pages, and recordings in which the disturbance is measured."""
@@ -76,19 +73,11 @@ class DisturbanceResponse:
         first[:, : together.first_measured.shape[1]] = together.first_measured
         first[:, -1] = [values[np.argmax(np.isfinite(values))] for values in disturbance]
         with_outputs = dataclasses.replace(recorded, measured=np.ascontiguousarray(measured))
-        return candidate.calibration_pages(self._values, first), with_outputs
+        values = [self.model.values(k) for k in range(len(self.series))]
+        return candidate.calibration_pages(values, first), with_outputs
 
-    @cached_property
-    def _values(self) -> list[dict[str, float]]:
-        """The parameter values [SI] of each recording."""
-        return [self.model.values(k) for k in range(len(self.series))]
-
-    def innovations(self, predictions: Sequence[Prediction]) -> list[Reals]:
+    def after_burn_in(self, innovations: Sequence[Reals]) -> list[Reals]:
         """Return the innovations of compared outputs after burn-in, (samples, outputs) each."""
-        return self._after_burn_in([one.innovations for one in predictions])
-
-    def _after_burn_in(self, innovations: Sequence[Reals]) -> list[Reals]:
-        """Return the part of innovations after the burn-in, for the compared outputs."""
         seen = len(self.model.candidate.predictor.outputs)
         skip = burn_in_samples(self.series[0])
         return [one[skip:, :seen] for one in innovations]
@@ -105,26 +94,25 @@ def build_disturbance_response(
     kind = DISTURBANCE_KIND_BY_SECTION[section]
     disturbance = model_set.scale_disturbance(disturbance_effect(kind, place))
     placed_effect = dataclasses.replace(disturbance, suffix=f"probe_{place}"[:25])
+    state = placed_effect.qualified_name(DISTURBANCE_STATE)
     torques = element_torques(model_set.automaton)
-    seen = (*model_set.output_names, *torques, placed_effect.qualified_name(DISTURBANCE_STATE))
-    document = _with_outputs(model_set.document, seen)
+    seen = (*model_set.output_names, *torques, state)
     candidate = compile_candidate(
-        document,
+        _with_outputs(model_set.document, seen),
         model_set.project,
         model.candidate.placed_effects,
         (*model_set.disturbances, placed_effect),
         seen,
         model_set.period,
     )
-    first, steady = _embed_gains(candidate, model, placed_effect.qualified_name(DISTURBANCE_STATE))
+    first, steady = _embed_gains(candidate, model, state)
     return DisturbanceResponse(model, candidate, model_set.series, torques, first, steady)
 
 
 def element_torques(automaton: Automaton) -> tuple[str, ...]:
     """Return the torques of elements that are single names, in the order of elements."""
-    trees = [
-        one.parts["torque"].tree for one in automaton.elements.values() if "torque" in one.parts
-    ]
+    torques = [one.parts.get("torque") for one in automaton.elements.values()]
+    trees = [torque.tree for torque in torques if torque is not None]
     return tuple(tree.path for tree in trees if isinstance(tree, Name))
 
 
@@ -142,17 +130,14 @@ def _with_outputs(document: Document, names: Sequence[str]) -> Document:
 
 def _embed_gains(candidate: Candidate, model: Estimate, disturbance: str) -> tuple[Reals, Reals]:
     """Return the gains of a model in a larger candidate, with 1 from disturbance to its state."""
-    states, known = candidate.predictor.states, model.candidate.predictor
-    rows = [states.index(name) for name in known.states]
-    columns = [candidate.predictor.outputs.index(name) for name in known.outputs]
-    place = np.ix_(rows, columns)
-    first = np.zeros((len(model.gains.transient), len(states), len(candidate.predictor.outputs)))
-    steady = np.zeros((len(candidate.predictor.modes), *first.shape[1:]))
-    for k, gain in enumerate(model.gains.transient):
-        first[k][place] = gain
-    for k, mode in enumerate(candidate.predictor.modes):
-        steady[k][place] = model.gains.steady_state[known.modes.index(mode)]
-    row, column = states.index(disturbance), candidate.predictor.outputs.index(disturbance)
-    first[:, row, column] = 1.0
-    steady[:, row, column] = 1.0
-    return first, steady
+    whole, known = candidate.predictor, model.candidate.predictor
+    rows = np.array([whole.states.index(name) for name in known.states])
+    columns = [whole.outputs.index(name) for name in known.outputs]
+    steady_state = model.gains.steady_state[[known.modes.index(mode) for mode in whole.modes]]
+    embedded = []
+    for gains in (model.gains.transient, steady_state):
+        larger = np.zeros((len(gains), len(whole.states), len(whole.outputs)))
+        larger[:, rows[:, np.newaxis], columns] = gains
+        larger[:, whole.states.index(disturbance), whole.outputs.index(disturbance)] = 1.0
+        embedded.append(larger)
+    return embedded[0], embedded[1]

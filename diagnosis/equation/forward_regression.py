@@ -101,14 +101,12 @@ def select_terms(
         ]
         if not gains or max(gains) < min_gain:
             break
-        best = rest[int(np.argmax(gains))]
-        left_out = _cross_validated_cost(problem, selected) - _cross_validated_cost(
-            problem, [*selected, best]
-        )
+        larger = [*selected, rest[int(np.argmax(gains))]]
+        left_out = _cross_validated_cost(problem, selected) - _cross_validated_cost(problem, larger)
         if selected and left_out < min_gain:
             break
-        selected.append(best)
-        chosen.append(SelectedTerm(best, max(gains), left_out))
+        selected = larger
+        chosen.append(SelectedTerm(selected[-1], max(gains), left_out))
     return chosen
 
 
@@ -132,9 +130,8 @@ def coefficients_of(problem: RegressionProblem, selected: Sequence[TermColumns])
 def _complexity_penalty(problem: RegressionProblem, term: TermColumns) -> float:
     """Return the BIC penalty [nats] of a term, with the effective number of samples."""
     count = len(term.places) * (len(problem.products) if term.has_recording_coefficients else 1)
-    return float(
-        0.5 * count * np.log(max(problem.samples / problem.integrated_autocorrelation, 2.0))
-    )
+    effective = max(problem.samples / problem.integrated_autocorrelation, 2.0)
+    return float(0.5 * count * np.log(effective))
 
 
 def _cost(problem: RegressionProblem, selected: Sequence[TermColumns]) -> float:
@@ -195,9 +192,6 @@ def _selected_products(
     problem: RegressionProblem, selected: Sequence[TermColumns], products: Reals
 ) -> tuple[Reals, Reals]:
     """Return the products of the used columns: parameters, shared terms, terms per recording."""
-    shared = [
-        place for one in selected if not one.has_recording_coefficients for place in one.places
-    ]
-    own = [place for one in selected if one.has_recording_coefficients for place in one.places]
-    places = [*range(problem.parameters), *shared, *own]
+    shared_first = sorted(selected, key=lambda one: one.has_recording_coefficients)
+    places = [*range(problem.parameters), *(place for one in shared_first for place in one.places)]
     return products[np.ix_(places, places)], products[places, -1]

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.signal import lfilter
 
 from diagnosis.data.array_types import Reals
 
@@ -68,13 +69,14 @@ def generate_terms(signals: Signals, section: str, output: str = "") -> Iterator
 
     For "outputs" these are constants and terms of the signal `output`.
     """
-    count = {name: [len(one) for one in values] for name, values in signals.values.items()}
-    lengths = next(iter(count.values()))
-    ones = [np.ones(n) for n in lengths]
+    ones = [np.ones(len(values)) for values in next(iter(signals.values.values()))]
     yield _linear_term("a constant", "1", ones)
     yield LibraryTerm("a constant of each recording", "1", (tuple(ones),), per_recording=True)
     if section == "outputs":
-        yield from _signal_terms(signals, output)
+        yield _linear_term(output, output, signals.values[output])
+        yield from _lag_terms(signals, output)
+        for rate in signals.angle_rates:
+            yield from _order_terms(signals, rate, output, signals.values[output])
         return
     yield from _speed_terms(signals)
     for name in signals.torques:
@@ -91,14 +93,6 @@ def generate_terms(signals: Signals, section: str, output: str = "") -> Iterator
 def _linear_term(name: str, text: str, values: Sequence[Reals]) -> LibraryTerm:
     """Return a term with one coefficient."""
     return LibraryTerm(name, text, (tuple(values),))
-
-
-def _signal_terms(signals: Signals, output: str) -> Iterator[LibraryTerm]:
-    """Yield the terms of an output: itself, its lags and its orders."""
-    yield _linear_term(output, output, signals.values[output])
-    yield from _lag_terms(signals, output)
-    for rate in signals.angle_rates:
-        yield from _order_terms(signals, rate, output, signals.values[output])
 
 
 def _speed_terms(signals: Signals) -> Iterator[LibraryTerm]:
@@ -138,16 +132,10 @@ def _torque_terms(signals: Signals, name: str) -> Iterator[LibraryTerm]:
         yield from _torque_speed_terms(signals, name, speed)
     yield from _lag_terms(signals, name)
     yield from _rate_limit_terms(signals, name)
-    period = signals.period
-    clock = {"t": ("s", "der(t) = 1")}
-    growing = [x * period * np.arange(len(x)) for x in values]
-    yield LibraryTerm(
-        f"{name} that grows with time",
-        f"{name} * t",
-        (tuple(growing),),
-        clock,
-        unit_expression=f"{name} * (1 s)",
-    )
+    clock, seconds = {"t": ("s", "der(t) = 1")}, f"{name} * (1 s)"
+    growing = (tuple(x * signals.period * np.arange(len(x)) for x in values),)
+    label, text = f"{name} that grows with time", f"{name} * t"
+    yield LibraryTerm(label, text, growing, clock, unit_expression=seconds)
 
 
 def _torque_speed_terms(signals: Signals, torque: str, speed: str) -> Iterator[LibraryTerm]:
@@ -159,16 +147,17 @@ def _torque_speed_terms(signals: Signals, torque: str, speed: str) -> Iterator[L
     lost = [np.abs(x) * np.tanh(w / bend) for x, w in values]
     yield _linear_term(f"the amount of {torque} against {speed}", f"abs({torque}) * {sign}", lost)
     yield _linear_term(f"{torque} times {speed}", f"{torque} * {speed}", [x * w for x, w in values])
+    if (unit, of_speed) != ("N*m", "rad/s"):
+        return
     power = max(float(np.max(np.abs(x * w))) for x, w in values)
+    floor = _round_two_digits(0.02 * signals.largest(speed))
     for part in LIMIT_FRACTIONS:
         most = _round_two_digits(part * power)
-        floor = _round_two_digits(0.02 * signals.largest(speed))
         limit = [most / np.maximum(np.abs(w), floor) for _, w in values]
         over = [x - np.clip(x, -b, b) for (x, _), b in zip(values, limit, strict=True)]
         bound = f"{most:g} W / max(abs({speed}), {floor:g} {of_speed})"
         text = f"({torque} - clip({torque}, -({bound}), {bound}))"
-        if (unit, of_speed) == ("N*m", "rad/s"):
-            yield _linear_term(f"{torque} where its power is beyond {most:g} W", text, over)
+        yield _linear_term(f"{torque} where its power is beyond {most:g} W", text, over)
 
 
 def _lag_terms(signals: Signals, name: str) -> Iterator[LibraryTerm]:
@@ -207,11 +196,8 @@ def _limit_rate(values: Reals, max_change: float) -> Reals:
 def _low_pass(values: Reals, lag: float, period: float) -> Reals:
     """Return a signal after a first-order lag with time constant `lag` [s]."""
     kept = np.exp(-period / lag)
-    found, now = np.empty_like(values), float(values[0])
-    for k, value in enumerate(values):
-        now = kept * now + (1.0 - kept) * float(value)
-        found[k] = now
-    return found
+    late, _ = lfilter([1.0 - kept], [1.0, -kept], values, zi=[kept * values[0]])
+    return np.asarray(late, dtype=np.float64)
 
 
 def _order_terms(

@@ -67,9 +67,8 @@ def is_inactive(model_set: ModelSet, location: Location, path: str) -> bool:
     ]
     size = np.abs(np.concatenate(input_values))
     squares = _stacked_disturbance(location) ** 2
-    return float(np.sum(squares[size < INACTIVE_AMPLITUDE * size.max()])) > INACTIVE_ENERGY * float(
-        np.sum(squares)
-    )
+    inactive = float(np.sum(squares[size < INACTIVE_AMPLITUDE * size.max()]))
+    return inactive > INACTIVE_ENERGY * float(np.sum(squares))
 
 
 def balance_of(model_set: ModelSet, section: str, place: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 
 import numpy as np
@@ -32,14 +33,10 @@ def find_correlates(
         target_values = np.concatenate(disturbances)
         if np.std(values) > 0.0 and np.std(target_values) > 0.0:
             correlations.append((name, float(np.corrcoef(values, target_values)[0, 1])))
-    correlations.append(
-        ("the recording (not the same in each)", _recording_correlation(disturbances))
-    )
-    angles = _order_angles(model_set, free_model).items()
-    correlations += [
-        (name, _order_correlation(target, _known_parts(each, disturbances)))
-        for name, each in angles
-    ]
+    recording = "the recording (not the same in each)"
+    correlations.append((recording, _recording_correlation(disturbances)))
+    for name, each in _order_angles(model_set, free_model).items():
+        correlations.append((name, _order_correlation(target, _known_parts(each, disturbances))))
     correlations = [(name, value) for name, value in correlations if np.isfinite(value)]
     return tuple(sorted(correlations, key=lambda pair: -abs(pair[1]))[:MAX_CORRELATES])
 
@@ -57,7 +54,7 @@ def _known_parts(parts: Sequence[Reals], disturbances: Sequence[Reals]) -> list[
 
 def _features(model_set: ModelSet, free_model: Estimate) -> dict[str, list[Reals]]:
     """Return the features of states, inputs and time by name, (samples,) for each recording."""
-    columns: dict[str, list[Reals]] = {}
+    columns: dict[str, list[Reals]] = defaultdict(list)
     states = free_model.candidate.predictor.states
     for one, prediction in zip(model_set.series, free_model.prediction.predictions, strict=True):
         rows, period = prediction.states[: prediction.completed], float(one.period)
@@ -65,30 +62,24 @@ def _features(model_set: ModelSet, free_model: Estimate) -> dict[str, list[Reals
             if state.range and name in states:
                 x = rows[:, states.index(name)]
                 scale = float(np.std(x)) or 1.0
-                sign: Reals = np.tanh(10.0 * x / scale)
-                columns.setdefault(f"the sign of {name}", []).append(sign)
-                columns.setdefault(f"the square of {name}", []).append(x * np.abs(x))
-                columns.setdefault(name, []).append(x)
+                columns[f"the sign of {name}"].append(np.tanh(10.0 * x / scale))
+                columns[f"the square of {name}"].append(x * np.abs(x))
+                columns[name].append(x)
         for k, name in enumerate(model_set.automaton.inputs):
             u = one.inputs[: prediction.completed, k]
-            columns.setdefault(name, []).append(u)
-            columns.setdefault(f"the amount of {name}", []).append(np.abs(u))
-            rate: Reals = np.asarray(np.gradient(u), dtype=np.float64) / period
-            columns.setdefault(f"the rate of {name}", []).append(rate)
-        columns.setdefault("time", []).append(
-            np.arange(prediction.completed, dtype=np.float64) * period
-        )
+            columns[name].append(u)
+            columns[f"the amount of {name}"].append(np.abs(u))
+            columns[f"the rate of {name}"].append(np.gradient(u) / period)
+        columns["time"].append(np.arange(prediction.completed, dtype=np.float64) * period)
     return columns
 
 
 def _order_angles(model_set: ModelSet, free_model: Estimate) -> dict[str, list[Reals]]:
     """Return the angle times the order by name of the feature, (samples,) by recording."""
-    states = free_model.candidate.predictor.states
-    rates = [rate for rate in angle_rates(model_set) if rate in states]
+    states, period = free_model.candidate.predictor.states, float(model_set.period)
     found = {}
-    for rate in rates:
+    for rate in (rate for rate in angle_rates(model_set) if rate in states):
         column = states.index(rate)
-        period = float(model_set.period)
         angles = [
             np.cumsum(one.states[: one.completed, column]) * period
             for one in free_model.prediction.predictions

@@ -21,9 +21,7 @@ from diagnosis.model.placed_effect import DISTURBANCE_STATE, PlacedEffect
 
 INITIAL_LEVEL = 10.0
 WIDE_LEVELS = (1.0, 100.0, 1000.0)
-"""Levels that are tried before the parameters are fitted:
-a sensor error can be 100 times its noise.
-"""
+"""Levels tried before the parameters are fitted: a sensor error can be 100 times its noise."""
 NEAR_LEVELS = (3.0, 30.0, 300.0)
 """Levels that are tried after the parameters are fitted."""
 ALL_LEVELS = tuple(sorted((INITIAL_LEVEL, *WIDE_LEVELS, *NEAR_LEVELS)))
@@ -41,14 +39,9 @@ def free_disturbance(
     and declared parameters, takes at most `MAX_ITERATIONS` (3) steps and is cached. The cost is
     infinite if it diverges.
     """
-    known = placed_effect is None or any(
-        placed_effect.id == other.id for other in model_set.disturbances
-    )
-    drifts = (
-        model_set.disturbances
-        if known or placed_effect is None
-        else (*model_set.disturbances, placed_effect)
-    )
+    drifts = model_set.disturbances
+    if placed_effect is not None and placed_effect.id not in {one.id for one in drifts}:
+        drifts = (*drifts, placed_effect)
     candidate = model_set.compile_candidate(base.candidate.placed_effects, drifts)
     fit = partial(_fit_free_disturbance, model_set, base, candidate, placed_effect)
     dependencies = [base.point, base.noise_levels, placed_effect and placed_effect.id]
@@ -87,9 +80,8 @@ def scan_level(
     best = estimate
     for level in levels:
         noise_levels = with_disturbance_levels(estimate.noise_levels, units, {name: level})
-        tried = evaluate(
-            estimate.candidate, series, noise_levels, estimate.point, estimate.prediction
-        )
+        point, near = estimate.point, estimate.prediction
+        tried = evaluate(estimate.candidate, series, noise_levels, point, near)
         best = tried if tried.cost < best.cost else best
     return best
 

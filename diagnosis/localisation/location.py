@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.data.stacked_recordings import burn_in_samples
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.model_set import ModelSet
-from diagnosis.estimation.place_magnitude import acting_rms
+from diagnosis.estimation.place_magnitude import acting_rms, rms
 from diagnosis.localisation.correlate import find_correlates
 from diagnosis.localisation.smoother import smooth_states
 from diagnosis.model.placed_effect import DISTURBANCE_STATE, PlacedEffect
@@ -53,15 +53,13 @@ class Location:
     gain: float
     rms: float
     windows: tuple[tuple[float, float, str], ...] = ()
-    modes: dict[str, float] = dataclasses.field(default_factory=dict)
+    modes: dict[str, float] = field(default_factory=dict)
     correlates: tuple[tuple[str, float], ...] = ()
     fraction: float = 0.0
     is_accepted: bool = False
-    free_model: Estimate | None = dataclasses.field(default=None, repr=False, compare=False)
+    free_model: Estimate | None = field(default=None, repr=False, compare=False)
     disturbance_state: str = ""
-    disturbances: tuple[DisturbanceEstimate, ...] = dataclasses.field(
-        default=(), repr=False, compare=False
-    )
+    disturbances: tuple[DisturbanceEstimate, ...] = field(default=(), repr=False, compare=False)
 
     @property
     def path(self) -> str:
@@ -73,21 +71,14 @@ def location_of(
     model_set: ModelSet, section: str, placed_effect: PlacedEffect, free_model: Estimate
 ) -> Location:
     """Return the location of a fit from filtered values, with gain 0 and without windows."""
-    drifts = disturbances_of(
-        model_set.series, free_model, placed_effect.qualified_name(DISTURBANCE_STATE)
+    state = placed_effect.qualified_name(DISTURBANCE_STATE)
+    column = free_model.candidate.predictor.states.index(state)
+    runs = zip(model_set.series, free_model.prediction.predictions, strict=True)
+    drifts = [run.states[burn_in_samples(one) : run.completed, column] for one, run in runs]
+    location = Location(
+        section, placed_effect.place, 0.0, 0.0, free_model=free_model, disturbance_state=state
     )
-    size = _rms(drifts)
-    return Location(
-        section,
-        placed_effect.place,
-        0.0,
-        size,
-        modes=_mode_shares(model_set, drifts, free_model),
-        correlates=find_correlates(model_set, free_model, drifts),
-        fraction=_relative_size(model_set, section, placed_effect.place, free_model, size),
-        free_model=free_model,
-        disturbance_state=placed_effect.qualified_name(DISTURBANCE_STATE),
-    )
+    return _with_values(model_set, location, free_model, drifts)
 
 
 def with_smoothed_disturbances(model_set: ModelSet, location: Location) -> Location:
@@ -98,15 +89,12 @@ def with_smoothed_disturbances(model_set: ModelSet, location: Location) -> Locat
     if location.free_model is None or location.disturbances:
         return location
     column = location.free_model.candidate.predictor.states.index(location.disturbance_state)
-    unknown = tuple(
-        DisturbanceEstimate(
-            run.states[burn_in_samples(one) :, column], run.stds[burn_in_samples(one) :, column]
-        )
-        for one, run in zip(
-            model_set.series, smooth_states(location.free_model, model_set.series), strict=True
-        )
-    )
-    return with_disturbances(model_set, location, unknown)
+    unknown = []
+    smoothed = smooth_states(location.free_model, model_set.series)
+    for one, run in zip(model_set.series, smoothed, strict=True):
+        known = slice(burn_in_samples(one), None), column
+        unknown.append(DisturbanceEstimate(run.states[known], run.stds[known]))
+    return with_disturbances(model_set, location, tuple(unknown))
 
 
 def with_disturbances(
@@ -117,45 +105,31 @@ def with_disturbances(
     Significant samples nearer than `WINDOW_DISTANCE` are one window; those shorter than half of it
     are dropped.
     """
-    assert location.free_model is not None
+    free_model = location.free_model
+    assert free_model is not None
     values = [one.values for one in disturbances]
     pairs = zip(model_set.series, disturbances, strict=True)
     windows = [window for one, known in pairs for window in _significant_windows(known, one)]
     windows.sort(key=lambda window: window[0] - window[1])
-    size = _rms(values)
+    location = dataclasses.replace(
+        location, windows=tuple(windows[:MAX_WINDOWS]), disturbances=disturbances
+    )
+    return _with_values(model_set, location, free_model, values)
+
+
+def _with_values(
+    model_set: ModelSet, location: Location, free_model: Estimate, values: Sequence[Reals]
+) -> Location:
+    """Return a location with size, modes and correlates of a disturbance [SI], (samples,) each."""
+    size = rms(np.concatenate(values))
+    scale = acting_rms(model_set, location.section, location.place, free_model)
     return dataclasses.replace(
         location,
         rms=size,
-        windows=tuple(windows[:MAX_WINDOWS]),
-        modes=_mode_shares(model_set, values, location.free_model),
-        correlates=find_correlates(model_set, location.free_model, values),
-        fraction=_relative_size(
-            model_set, location.section, location.place, location.free_model, size
-        ),
-        disturbances=disturbances,
+        modes=_mode_shares(model_set, values, free_model),
+        correlates=find_correlates(model_set, free_model, values),
+        fraction=size / scale if scale > 0.0 else 0.0,
     )
-
-
-def _relative_size(
-    model_set: ModelSet, section: str, place: str, free_model: Estimate, size: float
-) -> float:
-    """Return the size of a disturbance relative to what acts at its place; 0 if that is unknown."""
-    scale = acting_rms(model_set, section, place, free_model)
-    return size / scale if scale > 0.0 else 0.0
-
-
-def _rms(values: Sequence[Reals]) -> float:
-    """Return the root mean square over all recordings."""
-    return float(np.sqrt(np.mean(np.concatenate(values) ** 2)))
-
-
-def disturbances_of(
-    series: Sequence[SampledRecording], free_model: Estimate, name: str
-) -> list[Reals]:
-    """Return the filtered state `name` [SI] of each recording after its burn-in, (samples,)."""
-    place = free_model.candidate.predictor.states.index(name)
-    runs = zip(series, free_model.prediction.predictions, strict=True)
-    return [run.states[burn_in_samples(one) : run.completed, place] for one, run in runs]
 
 
 def _significant_windows(

@@ -32,15 +32,13 @@ def localise(model_set: ModelSet, base: Estimate) -> tuple[Location, ...]:
         for section, placed_effect in disturbance_locations(model_set, base)
     ]
     restricted_cost = free_disturbance(model_set, base).cost
-    finite_costs = [one.cost for *_, one in free if np.isfinite(one.cost)]
-    restricted_cost = (
-        restricted_cost if np.isfinite(restricted_cost) else max(finite_costs, default=0.0)
-    )
+    finite = [found for found in free if np.isfinite(found[-1].cost)]
+    if not np.isfinite(restricted_cost):
+        restricted_cost = max((one.cost for *_, one in finite), default=0.0)
     ranked = []
-    for section, placed_effect, one in free:
-        if np.isfinite(one.cost):
-            location = location_of(model_set, section, placed_effect, one)
-            ranked.append(dataclasses.replace(location, gain=restricted_cost - one.cost))
+    for section, placed_effect, one in finite:
+        location = location_of(model_set, section, placed_effect, one)
+        ranked.append(dataclasses.replace(location, gain=restricted_cost - one.cost))
     ranked.sort(key=lambda location: -location.gain)
     return tuple([with_smoothed_disturbances(model_set, ranked[0]), *ranked[1:]] if ranked else [])
 
@@ -56,9 +54,8 @@ def disturbance_locations(model_set: ModelSet, base: Estimate) -> list[tuple[str
     for entry in elements if isinstance(elements, MappingNode) else ():
         if model_set.automaton.elements[entry.key].kind == "elastic":
             locations.append(("elements", disturbance_effect("element", entry.key)))
-    locations += [
-        ("outputs", disturbance_effect("output", name)) for name in model_set.output_names
-    ]
+    for name in model_set.output_names:
+        locations.append(("outputs", disturbance_effect("output", name)))
     locations = [(section, model_set.scale_disturbance(one)) for section, one in locations]
     effects = base.candidate.placed_effects
     return [

@@ -73,14 +73,11 @@ def smooth_states(estimate: Estimate, series: Sequence[SampledRecording]) -> lis
     after, spread, ratios = smooth_deviations(steps, start, noise_levels.outputs**2)
     result = []
     for r, run in enumerate(estimate.prediction.predictions):
-        around = max(1, series[r].sample_count(AVERAGING_TIME))
-        scale = np.sqrt(np.maximum(_moving_mean(ratios[: run.completed, :, r], around), 1.0))
-        states = (
-            run.states[: run.completed]
-            - steps.corrections[: run.completed, r]
-            + after[: run.completed, r]
-        )
-        result.append(SmoothedStates(states, scale[:, None] * spread[: run.completed, r]))
+        rows = slice(run.completed)
+        around = series[r].sample_count(AVERAGING_TIME)
+        scale = np.sqrt(np.maximum(_moving_mean(ratios[rows, :, r], around), 1.0))
+        states = run.states[rows] - steps.corrections[rows, r] + after[rows, r]
+        result.append(SmoothedStates(states, scale[:, None] * spread[rows, r]))
     return result
 
 
@@ -94,24 +91,17 @@ def _smoother_input(estimate: Estimate, models: dict[int, LocalModel]) -> Smooth
     modes, default_model = list(predictor.modes), next(iter(models.values()))
     first, steady = estimate.gains.transient, estimate.gains.steady_state
     for r, run in enumerate(runs):
-        mode_indices = np.array([modes.index(int(mode)) for mode in run.modes[: run.completed]])
-        gains = steady[mode_indices]
+        rows = slice(run.completed)
+        places[rows, r] = [modes.index(int(mode)) for mode in run.modes[rows]]
+        gains = steady[places[rows, r]]
         gains[: len(first)] = first[: len(gains)]
-        innovations[: run.completed, r], places[: run.completed, r] = (
-            run.innovations[: run.completed],
-            mode_indices,
-        )
-        corrections[: run.completed, r] = np.einsum(
-            "kij,kj->ki", gains, np.nan_to_num(innovations[: run.completed, r])
-        )
-    models_by_mode = [models.get(mode, default_model) for mode in modes]
-    phi, c = (
-        np.array([getattr(one.linear, name) for one in models_by_mode])[places]
-        for name in ("phi", "c")
-    )
-    return SmootherInput(
-        innovations, corrections, phi, np.array([one.q for one in models_by_mode])[places], c
-    )
+        innovations[rows, r] = run.innovations[rows]
+        corrections[rows, r] = np.einsum("kij,kj->ki", gains, np.nan_to_num(innovations[rows, r]))
+    by_mode = [models.get(mode, default_model) for mode in modes]
+    phi = np.array([one.linear.phi for one in by_mode])[places]
+    c = np.array([one.linear.c for one in by_mode])[places]
+    q = np.array([one.q for one in by_mode])[places]
+    return SmootherInput(innovations, corrections, phi, q, c)
 
 
 def smooth_deviations(
@@ -124,11 +114,8 @@ def smooth_deviations(
     """
     before, covariances, corrections = _forward_pass(data, initial_std, noise_variances)
     after, spread = _backward_pass(data, before, covariances, corrections)
-    return (
-        after,
-        spread,
-        np.array([[one.normalised_square for one in each] for each in corrections]),
-    )
+    squares = np.array([[one.normalised_square for one in each] for each in corrections])
+    return after, spread, squares
 
 
 def _forward_pass(

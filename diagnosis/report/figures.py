@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from matplotlib.figure import Figure
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.place_magnitude import disturbance_unit
 from diagnosis.experiment.discrimination import ExperimentPlan
@@ -75,7 +76,8 @@ def draw_disturbance(
     """
     values, reach = disturbance.values, SIGNIFICANT_STDS * disturbance.stds
     first = series.count - len(values)
-    times = float(series.start) + np.arange(first, series.count) * float(series.period)
+    times: Reals = np.arange(first, series.count, dtype=np.float64) * float(series.period)
+    times += float(series.start)
     moving = moving_inputs(series.inputs, inputs)
     names = list(inputs)
     figure = Figure(figsize=(8.5, 4.2 if moving else 2.8), layout="constrained")

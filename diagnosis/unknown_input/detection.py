@@ -154,9 +154,9 @@ def _unknown_input_effects(model_set: ModelSet) -> dict[str, PlacedEffect]:
     """Return, by path, the inputs without parameters that the library knows for balances."""
     balances = {drift.place for drift in model_set.disturbances}
     return {
-        f"flow.{placed_effect.place}": placed_effect
+        f"flow.{one.place}": one
         for effect in model_set.effects
         if effect.body.get("parameters") is None
-        for placed_effect in find_placements(model_set.document, effect)
-        if placed_effect.place in balances
+        for one in find_placements(model_set.document, effect)
+        if one.place in balances
     }

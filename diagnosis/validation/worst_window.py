@@ -69,23 +69,23 @@ def find_worst_window(runs: FreeRuns, units: Sequence[str], label: str) -> Worst
     series, before, after = runs.series, runs.before, runs.after
     spread = np.nanstd(np.concatenate([one.measured for one in series]), axis=0)
     scale = np.maximum(spread, 1e-12)
-    most, place = -1.0, (0, 0)
-    for k, one in enumerate(series):
-        for start in _window_starts(one):
-            window = _window_slice(one, start)
-            alone = slice(start + one.sample_count(OBSERVED_TIME), window.stop)
-            missed = (one.measured[alone] - before[k][alone]) / scale
+    most, k, window = -1.0, 0, slice(0)
+    for r, one in enumerate(series):
+        observed, whole = one.sample_count(OBSERVED_TIME), one.sample_count(WINDOW_TIME)
+        for start in range(0, max(1, one.count - observed - 1), whole):
+            end = min(one.count, start + whole)
+            alone = slice(start + observed, end)
+            missed = (one.measured[alone] - before[r][alone]) / scale
             squares = float(np.nansum(missed**2))
             if squares > most:
-                most, place = squares, (k, start)
-    k, start = place
-    one, window = series[k], _window_slice(series[k], start)
+                most, k, window = squares, r, slice(start, end)
+    one = series[k]
     period = float(one.period)
     times = float(one.start) + np.arange(window.start, window.stop) * period
     return WorstWindow(
         one.name,
         f"worst window of the {label} recordings: {one.name}, {times[0]:.4g} to {times[-1]:.4g} s",
-        float(one.start) + (start + one.sample_count(OBSERVED_TIME)) * period,
+        float(one.start) + (window.start + one.sample_count(OBSERVED_TIME)) * period,
         times,
         one.inputs[window],
         one.measured[window],
@@ -94,14 +94,3 @@ def find_worst_window(runs: FreeRuns, units: Sequence[str], label: str) -> Worst
         runs.signals,
         tuple(units),
     )
-
-
-def _window_starts(series: SampledRecording) -> range:
-    """Return the first samples of the windows that contain free simulation."""
-    last = max(1, series.count - series.sample_count(OBSERVED_TIME) - 1)
-    return range(0, last, series.sample_count(WINDOW_TIME))
-
-
-def _window_slice(series: SampledRecording, start: int) -> slice:
-    """Return the samples of the window at a start."""
-    return slice(start, min(series.count, start + series.sample_count(WINDOW_TIME)))
