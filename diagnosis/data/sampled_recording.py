@@ -139,9 +139,8 @@ def sample_recording(
     inputs: Sequence[str],
     output_names: Sequence[str],
     defaults: Mapping[str, float],
-    period: Fraction | None = None,
 ) -> SampledRecording:
-    """Return a recording on the grid of its fastest channel, or on a grid of `period` [s].
+    """Return a recording on the grid of its fastest channel.
 
     The grid begins at the first stamp of the fastest compared channel at which all channels are
     known, and ends with the channel that ends first. An input without a channel is constant at its
@@ -156,8 +155,10 @@ def sample_recording(
     if short is not None:
         raise ValueError(f"{recording.name}: `{short.column.name}` has one sample only")
     end = min(channel.times[-1] for channel in used)
-    start = _first_common_stamp(compared, used)
-    step = period or min(grid_period(channel.times) for channel in used)
+    common = max(channel.times[0] for channel in used)
+    fastest = min(compared, key=lambda channel: grid_period(channel.times))
+    start = next((time for time in fastest.times if time >= common), common)
+    step = min(grid_period(channel.times) for channel in used)
     count = int((end - start) / step + MAX_SLIP) + 1
     if count < 2:
         raise ValueError(f"{recording.name}: only {count} samples in common")
@@ -332,15 +333,6 @@ def simplest_fraction(low: Fraction, high: Fraction) -> Fraction:
     if whole + 1 <= high:
         return Fraction(whole + 1)
     return whole + 1 / simplest_fraction(1 / (high - whole), 1 / (low - whole))
-
-
-def _first_common_stamp(
-    compared_channels: Sequence[Channel], used_channels: Sequence[Channel]
-) -> Fraction:
-    """Return the first stamp [s] of the fastest compared channel after all channels begin."""
-    common = max(channel.times[0] for channel in used_channels)
-    fastest = min(compared_channels, key=lambda channel: grid_period(channel.times))
-    return next((time for time in fastest.times if time >= common), common)
 
 
 def _sample_indices(channel: Channel, start: Fraction, step: Fraction) -> NDArray[np.int64]:

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
+from scipy.signal import welch
 
 from diagnosis.data.array_types import Reals
-from diagnosis.data.spectrum import spectrum
 from diagnosis.data_quality.channel import ChannelCheck, check_channel
 from engine.recordings.recording import Channel, Recording, split_by_windows
 from language.expressions.units import PURE_NUMBER, are_compatible, parse_unit
@@ -338,3 +338,15 @@ def _has_power_range(
     strong = np.abs(torque) > 0.6 * max(abs(first.low), abs(first.high))
     fast = np.abs(speed) > 0.6 * largest
     return bool((strong & fast).any() and (strong & ~fast).any())
+
+
+def spectrum(values: Reals, rate: float, max_window: int) -> tuple[Reals, Reals]:
+    """Return frequencies [Hz] and one-sided power spectral density (Welch 1967) at `rate` [Hz].
+
+    Hann windows of `max_window` samples (all if fewer) overlap by half.
+    """
+    length = min(len(values), max_window)
+    frequencies, power = welch(
+        values, rate, np.hanning(length), noverlap=length // 2, detrend="constant"
+    )
+    return frequencies, power

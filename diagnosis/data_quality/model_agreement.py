@@ -170,7 +170,8 @@ def compare_signals(
     if -correlations[reversed_lag] > correlations[best] + REVERSAL_MARGIN:
         best = reversed_lag
     alike = (pairs[best], *_low_frequency_rates(comparison, grid, best))
-    gains = [_spread_ratio(pair) for pair in alike]
+    ratios = [float(np.std(y)) / max(float(np.std(x)), 1e-12) for y, x in alike]
+    gains = [min(max(ratio, 1e-6), 1e6) for ratio in ratios]
     gain = math.copysign(min(gains, key=lambda g: abs(math.log(g))), correlations[best])
     late = comparison.times > 0.5 * (start + end)
     level = _rms(comparison.measured[late]) / max(_rms(comparison.simulated[late]), 1e-12)
@@ -189,11 +190,6 @@ def _low_frequency_rates(
     times, spread = comparison.times, GAIN_SMOOTHING_STD
     measured = _smoothed_rate(times, comparison.measured, shifted[kept], spread)
     return [(measured, _smoothed_rate(times, comparison.simulated, grid[kept], spread))]
-
-
-def _spread_ratio(pair: tuple[Reals, Reals]) -> float:
-    """Return the ratio of the standard deviations, limited to 1e-6 to 1e6."""
-    return min(max(float(np.std(pair[0])) / max(float(np.std(pair[1])), 1e-12), 1e-6), 1e6)
 
 
 def _rms(values: Reals) -> float:

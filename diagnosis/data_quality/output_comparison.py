@@ -28,36 +28,22 @@ from language.text.diagnostic import Problem, SpecError
 
 INITIAL_INPUT_NAME = "recorded_start_of_{}"
 """Name of the input that gives the initial value of a state."""
-MIN_STD = 1e-12
-"""Smallest standard deviation [SI] by which an error is divided; a constant output has 0."""
 
 
 @dataclass(frozen=True)
 class OutputComparison:
     """A recorded output and the simulated one at its time stamps [s], in SI, (samples,) each."""
 
-    output: str
     times: Reals
     measured: Reals
     simulated: Reals
 
-    @property
-    def rms(self) -> float:
-        """The root mean square of measured minus simulated values."""
-        return float(np.sqrt(np.mean((self.measured - self.simulated) ** 2)))
-
-    @property
-    def nrmse(self) -> float:
-        """`rms` over the standard deviation of the measured values, which is at least MIN_STD."""
-        return self.rms / max(float(np.std(self.measured)), MIN_STD)
-
 
 @dataclass(frozen=True)
 class FreeRun:
-    """A simulation from the time `start` [s] of a recording, and its comparison by column name."""
+    """A simulation under the inputs of a recording, and its comparison by column name."""
 
     trajectory: Trajectory
-    start: Fraction
     comparisons: Mapping[str, OutputComparison]
 
 
@@ -96,8 +82,8 @@ def simulate_free_run(
     if end <= start:
         label = f"recording `{recording.name}` ends before every input has a value"
         raise SpecError([Problem("range", recording.place or mapping.span, label)])
-    initial_values = {
-        source: _value_at(channel, start)
+    initial_values = {  # the latest value at the start, else the first one
+        source: Fraction(channel.values[max(0, bisect_right(channel.times, start) - 1)])
         for channel in outputs
         if (source := automaton.output_source(channel.column.compare or "")) in automaton.states
     }
@@ -121,7 +107,7 @@ def simulate_free_run(
         channel.column.name: _compare_output(automaton, channel, trajectory, start)
         for channel in outputs
     }
-    return FreeRun(trajectory, start, compared)
+    return FreeRun(trajectory, compared)
 
 
 def _simulate(
@@ -168,11 +154,6 @@ def _recorded_inputs(
     return found
 
 
-def _value_at(channel: Channel, start: Fraction) -> Fraction:
-    """Return the latest value of a channel at a time, or its first value."""
-    return Fraction(channel.values[max(0, bisect_right(channel.times, start) - 1)])
-
-
 def _compare_output(
     automaton: Automaton, channel: Channel, trajectory: Trajectory, start: Fraction
 ) -> OutputComparison:
@@ -183,7 +164,6 @@ def _compare_output(
     until = int(np.searchsorted(times, trajectory.times[-1], side="right"))
     signal = trajectory.signals[f"{automaton.name}.{output}"]
     return OutputComparison(
-        output,
         times[:until] + float(start),
         np.array(channel.values[first : first + until]),
         np.interp(times[:until], trajectory.times, signal),

@@ -10,9 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 
 from diagnosis.data.array_types import Reals
-from diagnosis.data.spectrum import spectrum
 from diagnosis.data_quality.channel import ChannelCheck
-from diagnosis.data_quality.excitation import Excitation, SignalExcitation
+from diagnosis.data_quality.excitation import Excitation, SignalExcitation, spectrum
 from diagnosis.data_quality.finding import format_findings
 from diagnosis.data_quality.recording_check import RecordingCheck
 from engine.recordings.recording import Channel, Recording

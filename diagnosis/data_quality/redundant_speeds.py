@@ -62,7 +62,7 @@ def _compare_speeds(
         return None
     times = other.seconds[inside]
     same = np.interp(times, one.seconds, one.array)
-    compared = OutputComparison(other.column.name, times, other.array[inside], same)
+    compared = OutputComparison(times, other.array[inside], same)
     return compare_signals(recording.name, other.column.name, compared, GAIN_SMOOTHING_STD)
 
 

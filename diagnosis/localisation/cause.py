@@ -46,11 +46,13 @@ def attribute_causes(model_set: ModelSet, location: Location) -> Iterator[str]:
     with both signs for a constant, else all inputs for a ripple.
     """
     paths = [f"inputs.{name}" for name in model_set.automaton.inputs]
+    strongest, part = location.correlates[0] if location.correlates else ("", 0.0)
+    is_ripple = strongest in order_features(location.place) and part > RIPPLE_CORRELATION
     if _follows_acceleration(model_set, location):
         paths = [f"elements.{name}" for name in model_set.automaton.elements]
     elif _is_constant(location):
         paths = [path for path in paths if _has_both_signs(model_set, path)]
-    elif not _is_ripple(location):
+    elif not is_ripple:
         paths = []
     yield from (path for path in paths if balance_of(model_set, *path.split(".")) == location.path)
 
@@ -81,12 +83,6 @@ def balance_of(model_set: ModelSet, section: str, place: str) -> str:
         if section == "inputs" and state in balances and place in names_in_text(scalar.text):
             return f"flow.{state}"
     return f"{section}.{place}"
-
-
-def _is_ripple(location: Location) -> bool:
-    """Return whether the strongest correlate is an order of the angle at the place."""
-    name, part = location.correlates[0] if location.correlates else ("", 0.0)
-    return name in order_features(location.place) and part > RIPPLE_CORRELATION
 
 
 def _follows_acceleration(model_set: ModelSet, location: Location) -> bool:

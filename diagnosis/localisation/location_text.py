@@ -35,14 +35,11 @@ def format_location(locations: Sequence[Location], model_set: ModelSet) -> str:
     unit = disturbance_unit(model_set, section, place)
     size = f"{best.rms:.3g} {unit}".strip() + " rms"
     if best.fraction > 0.0:
-        size += f" ({_format_percent(best.fraction)} {SCALE_PHRASES[section]})"
+        percent = 100.0 * best.fraction
+        size += f" ({percent:.2g} %" if percent < 100.0 else f" ({percent:.0f} %"
+        size += f" {SCALE_PHRASES[section]})"
     parts = [size, *_format_windows(best), *_format_correlates(best)]
     return f"missing {PLACE_PHRASES[best.section]} {best.place}: {', '.join(parts)}"
-
-
-def _format_percent(part: float) -> str:
-    """Return a fraction in per cent, with two digits below 100 %."""
-    return f"{100.0 * part:.2g} %" if part < 1.0 else f"{100.0 * part:.0f} %"
 
 
 def _format_windows(location: Location) -> list[str]:

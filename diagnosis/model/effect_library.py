@@ -169,10 +169,6 @@ def equation_changes(
     return [
         EquationChange(one.path, one.old.value if one.old else "", one.new.value if one.new else "")
         for one in found
-        if one.path.partition(".")[0] in EQUATION_SECTIONS and not _is_metadata(one.path)
+        if one.path.partition(".")[0] in EQUATION_SECTIONS
+        and not one.path.endswith((".unit", ".about", ".range", ".initial"))
     ]
-
-
-def _is_metadata(path: str) -> bool:
-    """Return whether a key path ends with a unit, a description, a range or an initial value."""
-    return path.endswith((".unit", ".about", ".range", ".initial"))

@@ -121,6 +121,7 @@ def _verdict_context(
     """Return the values of the template for the verdict, the cards and the changed equations."""
     verdict, found = report.verdict, report.diagnosis
     placed_effects = [one.placed_effect for one in found.selection.accepted] if found else []
+    effects = [one.effect for one in placed_effects]
     return {
         "name": report.name,
         "about": report.case.document.root.text_of("about"),
@@ -131,7 +132,7 @@ def _verdict_context(
         "cards": summary_cards(report, comparisons[0].after if comparisons else ()),
         "location": sentences.format_missing_location(report) if found else "",
         "messages": verdict.messages,
-        "abouts": _effect_summaries(report),
+        "abouts": [(one.name.replace("_", " "), one.about, one.signature) for one in effects],
         "changes": equation_changes(report.case.document, placed_effects),
         "places": tables.location_rows(verdict.location[0]) if verdict.location else [],
         "rivals": [sentences.format_effect(one) for one in verdict.ambiguous_with],
@@ -140,14 +141,6 @@ def _verdict_context(
         if comparisons
         else [],
     }
-
-
-def _effect_summaries(report: DiagnosisReport) -> list[tuple[str, str, str]]:
-    """Return name, description and signature text of each accepted effect."""
-    found = report.diagnosis
-    accepted = found.selection.accepted if found else ()
-    effects = [one.placed_effect.effect for one in accepted]
-    return [(one.name.replace("_", " "), one.about, one.signature) for one in effects]
 
 
 def _model_context(

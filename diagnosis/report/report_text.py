@@ -37,7 +37,9 @@ def format_headline(report: DiagnosisReport) -> str:
             f"it is: {'; '.join(names)}."
         )
     if verdict.verdict == "unknown":
-        like = _format_equation(report) or _format_nearest(report)
+        names = [format_effect(one) for one in verdict.ambiguous_with[:MAX_NAMED]]
+        nearest = f"; the nearest is {' or '.join(names)}" if names else ""
+        like = _format_equation(report) or nearest
         return f"`{report.name}` lacks something that none of the effects tried explains{like}."
     return (
         f"`{report.name}` lacks nothing that these recordings show: with its parameters "
@@ -52,12 +54,6 @@ def _format_equation(report: DiagnosisReport) -> str:
         return ""
     where = f"{PLACE_PHRASES[found.location.section]} {found.location.place}"
     return f"; it is like `{found.text}` {where}"
-
-
-def _format_nearest(report: DiagnosisReport) -> str:
-    """Return the effects nearest to an unknown cause as the end of a sentence; "" without any."""
-    names = [format_effect(one) for one in report.verdict.ambiguous_with]
-    return f"; the nearest is {' or '.join(names[:MAX_NAMED])}" if names else ""
 
 
 def format_effect(effect: NamedEffect) -> str:

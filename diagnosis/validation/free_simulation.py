@@ -58,7 +58,8 @@ def _nrmse_of(model: Estimate, series: Sequence[SampledRecording], runs: Sequenc
     """Return the `nrmse` of simulated outputs, (samples, outputs) of each recording."""
     squares, counts = [], []
     for one, simulated in zip(series, runs, strict=True):
-        counted = is_after_burn_in(one) if model.noise_levels.is_output_error else is_free(one)
+        after_burn_in = np.arange(one.count) >= burn_in_samples(one)
+        counted = after_burn_in if model.noise_levels.is_output_error else is_free(one)
         alone = counted[:, None] & np.isfinite(one.measured) & np.isfinite(simulated)
         error = np.where(alone, one.measured - simulated, 0.0)
         squares.append(np.sum(error**2, axis=0))
@@ -86,11 +87,6 @@ def simulate_free(model: Estimate, series: Sequence[SampledRecording]) -> list[R
     values = [model.values(k) for k in range(len(series))]
     run = predict(model.candidate, masked, values, model.gains, model.noise_levels.huber_limits)
     return [one.outputs for one in run.predictions]
-
-
-def is_after_burn_in(series: SampledRecording) -> NDArray[np.bool_]:
-    """Return the mask (samples,) of samples after the burn-in."""
-    return np.asarray(np.arange(series.count) >= burn_in_samples(series))
 
 
 def is_free(series: SampledRecording) -> NDArray[np.bool_]:
