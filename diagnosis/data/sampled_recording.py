@@ -1,10 +1,8 @@
 """Sampled recordings: recordings on a uniform time grid, for one-step prediction.
 
-The grid has the period of the fastest channel and begins at a sample of a compared channel. Each
-measured value belongs to its nearest sample; a compared channel is NaN at samples without a value.
-An input is held (zero-order hold), or linear between its time stamps if the recording map says
-`hold: linear`. An input with two values is held, and without `hold` in the map the others may be
-either.
+Each measured value belongs to its nearest sample. An input is held (zero-order hold), or linear
+between its time stamps with `hold: linear` in the recording map. An input with two values is held;
+without `hold` the others may be either.
 """
 
 from __future__ import annotations

@@ -1,9 +1,7 @@
-"""Column hypothesis: columns of a recording with a wrong clock or sign, found by the prediction
-error.
+"""Column hypothesis: columns with a wrong clock or sign, found by the prediction error.
 
-Each column is shifted in time or negated. If the declared model then predicts far better, the
-column has that error. Unknown loads, wrong parameters and missing physics increase the prediction
-errors with and without the change.
+A column that is shifted in time or negated, and then predicted far better, has that error. Unknown
+loads, wrong parameters and missing physics increase the errors in both cases.
 """
 
 from __future__ import annotations

@@ -279,24 +279,23 @@ def _is_brake(signal: SignalExcitation) -> bool:
 
 def _revolutions(used: Sequence[Recording], signal: SignalExcitation) -> float:
     """Return the number of turns in both directions [1] by the integral of a speed's magnitude."""
-    angle = 0.0
-    for piece in used:
-        channel = piece.channels.get(signal.name)
-        if channel and len(channel.array) > 1:
-            angle += float(np.trapezoid(np.abs(channel.array), channel.seconds))
+    channels = _channels_of(used, signal)
+    angle = sum(float(np.trapezoid(np.abs(c.array), c.seconds)) for c in channels)
     return angle / (2.0 * np.pi)
 
 
 def _time_moving(used: Sequence[Recording], signal: SignalExcitation) -> float:
     """Return the time [s] for which a speed exceeds 5 % of its largest magnitude."""
-    largest = max(abs(signal.low), abs(signal.high))
-    time = 0.0
-    for piece in used:
-        channel = piece.channels.get(signal.name)
-        if channel and len(channel.array) > 1 and largest:
-            moving = np.abs(channel.array[1:]) > 0.05 * largest
-            time += float(np.diff(channel.seconds)[moving].sum())
-    return time
+    limit = 0.05 * max(abs(signal.low), abs(signal.high))
+    channels = _channels_of(used, signal)
+    steps = [np.diff(c.seconds)[np.abs(c.array[1:]) > limit] for c in channels]
+    return float(sum(moving.sum() for moving in steps))
+
+
+def _channels_of(used: Sequence[Recording], signal: SignalExcitation) -> list[Channel]:
+    """Return the channels of a signal with at least two values."""
+    channels = [piece.channels.get(signal.name) for piece in used]
+    return [channel for channel in channels if channel and len(channel.array) > 1]
 
 
 def _paired_samples(

@@ -100,30 +100,18 @@ def simulate_free_run(
         every=automaton.step,
         span=mapping.span,
     )
-    trajectory = _simulate(
-        _with_initial_state_inputs(automaton, initial_values), scenario, run_program, programs
-    )
+    system = single_instance_system(_with_initial_state_inputs(automaton, initial_values))
+    varying = [name for name, stimulus in scenario.inputs.items() if stimulus.varies]
+    kind = (tuple(scenario.inputs), tuple(varying))
+    programs = {} if programs is None else programs
+    if kind not in programs:
+        programs[kind] = programs_of(system, scenario)
+    trajectory = run_program(system, scenario, programs[kind])
     compared = {
         channel.column.name: _compare_output(automaton, channel, trajectory, start)
         for channel in outputs
     }
     return FreeRun(trajectory, compared)
-
-
-def _simulate(
-    automaton: Automaton,
-    scenario: Scenario,
-    run_program: RunFunction,
-    programs: ProgramCache | None,
-) -> Trajectory:
-    """Return the trajectory of an automaton, with Programs from the cache where possible."""
-    system = single_instance_system(automaton)
-    varying = [name for name, stimulus in scenario.inputs.items() if stimulus.varies]
-    kind = (tuple(automaton.inputs), tuple(varying))
-    programs = {} if programs is None else programs
-    if kind not in programs:
-        programs[kind] = programs_of(system, scenario)
-    return run_program(system, scenario, programs[kind])
 
 
 def _with_initial_state_inputs(automaton: Automaton, names: Collection[str]) -> Automaton:

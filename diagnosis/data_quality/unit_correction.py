@@ -1,7 +1,4 @@
-"""Unit correction: another unit of a column, or two exchanged columns, that explain a mismatch.
-
-Each correction is tested by a simulation under the corrected recording.
-"""
+"""Unit correction: another unit of a column, or exchanged columns, tested by a simulation."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Equation discovery: a formula for an unknown disturbance, found by regression and fitted.
-
-The formula is fitted as an effect of the language, like those of the library.
-"""
+"""Equation discovery: a formula for an unknown disturbance, fitted as an effect of the language."""
 
 from __future__ import annotations
 

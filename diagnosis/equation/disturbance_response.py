@@ -1,7 +1,6 @@
 """Disturbance response: innovations of a model under a prescribed disturbance at one place.
 
-The disturbance is imposed through a disturbance state that is measured without noise, so the
-observer sets it to the prescribed values. Each term of a formula is tested by one such run.
+A disturbance state that is measured without noise imposes it: the observer sets it so.
 """
 
 from __future__ import annotations

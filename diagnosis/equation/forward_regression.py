@@ -1,7 +1,4 @@
-"""Forward regression: sparse selection of terms that explain innovations, with a BIC penalty.
-
-All computations use products of columns, which are formed once for each part of each recording.
-"""
+"""Forward regression: sparse selection of terms that explain innovations, with a BIC penalty."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
 """Term library: the terms from which a formula of an unknown disturbance may be built.
 
-Each term is an expression of the language with its values, and has a coefficient. A term with an
-order is a sine of an angle, with a phase as well.
+A term is an expression of the language with its values; one with an order is a sine of an angle.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Discriminating experiment: the manoeuvre that separates candidates best (T-optimality).
 
-The outputs of one candidate are predicted by another one with its observer, after its parameters
-have moved as far as the existing recordings allow. Half the remaining squares over the variances of
-innovations is the expected log Bayes factor [nats] (Atkinson, Fedorov 1975).
+One candidate predicts the outputs of another one, after its parameters have moved as far as the
+recordings allow. Half the remaining squares over the variances is the expected log Bayes factor
+[nats] (Atkinson, Fedorov 1975).
 """
 
 from __future__ import annotations

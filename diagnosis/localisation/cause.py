@@ -1,10 +1,8 @@
-"""Cause attribution: the input or body that causes a disturbance in a balance, from its time
-course.
+"""Cause attribution: the input or body that causes a disturbance in a balance.
 
 A disturbance that correlates with the acceleration belongs to a mass. One that is periodic in the
-angle belongs to an input: machines and discs have ripple, losses do not. A constant that depends
-neither on the speed, nor its sign, nor the recording belongs to an input as well: friction changes
-with the sign, and a road load differs between recordings.
+angle belongs to an input: machines have ripple, losses do not. So does a constant: friction changes
+with the sign of the speed, and a road load differs between recordings.
 """
 
 from __future__ import annotations
@@ -34,8 +32,7 @@ CONSTANT_MARGIN = 0.3
 """Fraction that the constant must explain beyond the line: a line through zero is friction."""
 
 INACTIVE_AMPLITUDE, INACTIVE_ENERGY = 0.02, 0.5
-"""Fraction of its largest magnitude below which an input is inactive, and the fraction of the
-squares of a disturbance that counts as most of it.
+"""Fraction of an input's largest magnitude that is inactive, and of squares that is most of them.
 """
 
 

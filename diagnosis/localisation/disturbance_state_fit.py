@@ -1,7 +1,4 @@
-"""Disturbance state fit: a fit of the base with a large process-noise level at one place.
-
-The other disturbances stay small.
-"""
+"""Disturbance state fit: a fit of the base with a large process-noise level at one place only."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
 """Compile cache: metadata and shared libraries of compiled candidates, kept between runs.
 
-Placing effects, checking, lowering and compiling takes about a second, longer than a fit; studies
-use the same candidates for many cases.
+Compiling takes about a second, longer than a fit; studies repeat candidates.
 """
 
 from __future__ import annotations

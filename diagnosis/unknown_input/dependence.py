@@ -1,7 +1,7 @@
 """Input dependence: whether a disturbance is large while known inputs vary, or near standstill.
 
-An unknown input is independent of known ones. Errors of an actuator, a shaft or a tyre appear when
-known inputs change, and errors of friction near standstill; these are no inputs.
+Errors of an actuator, a shaft or a tyre appear when known inputs change, and errors of friction
+near standstill; an unknown input is independent of both.
 """
 
 from __future__ import annotations

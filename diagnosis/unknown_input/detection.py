@@ -1,7 +1,7 @@
-"""Unknown input: detection of a force or torque that acts in windows, such as a brake or an impact.
+"""Unknown input: a force or torque that acts in windows, such as a brake or an impact.
 
-It is found as a free disturbance in a balance. Because that explains anything without parameters,
-it is accepted only if it is small most of the time and independent of what is known.
+It is found as a free disturbance in a balance. As that explains anything, it must be small most of
+the time and independent of what is known.
 """
 
 from __future__ import annotations

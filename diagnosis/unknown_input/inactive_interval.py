@@ -1,7 +1,6 @@
 """Inactive intervals: parameters estimated where an unknown input does not act.
 
-An input that is free everywhere also absorbs the error of a wrong mass or drag. In the
-intervals in which the input is inactive, the model must follow without it.
+An input that is free everywhere also absorbs the error of a wrong mass or drag.
 """
 
 from __future__ import annotations

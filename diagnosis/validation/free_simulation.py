@@ -1,8 +1,7 @@
 """Free simulation: the error of a model without corrections, before and after a diagnosis.
 
-An observer corrects the model for one second, then it runs freely for one and a half. The error
-there is normalised by the standard deviation of the recorded signal. A model with fading memory
-runs freely for the whole recording after the burn-in.
+An observer corrects the model for one second, then it runs freely for one and a half. A model with
+fading memory runs freely after the burn-in.
 """
 
 from __future__ import annotations

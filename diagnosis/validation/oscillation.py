@@ -1,8 +1,4 @@
-"""Driveline oscillation (shuffle): frequency and damping after the largest step, cycle by cycle.
-
-The recorded oscillation is compared with the simulated one, and the time for which the model
-follows it is determined.
-"""
+"""Driveline oscillation (shuffle): frequency and damping after the largest step, cycle by cycle."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Whiteness: the autocorrelation of the innovations of a model (Ljung, Box 1978).
-
-Autocorrelated innovations show that the model lacks something that was recorded.
-"""
+"""Whiteness: the autocorrelation of the innovations of a model (Ljung, Box 1978)."""
 
 from __future__ import annotations
 
