@@ -76,14 +76,6 @@ class ColumnHypothesis:
         return near and (self.column, self.factor) == (other.column, other.factor)
 
 
-@dataclass(frozen=True)
-class ColumnError:
-    """The correction of an error in one recording, or in all of them if `recording` is ""."""
-
-    hypothesis: ColumnHypothesis
-    recording: str
-
-
 def find_clock_and_sign_errors(
     document: Document,
     project: Project,
@@ -117,24 +109,24 @@ def find_clock_and_sign_errors(
         return None
     names = [*automaton.inputs, *seen]
     columns = {column.to or column.compare: column for column in mapping.columns.values()}
-    return [_to_finding(columns[names[one.hypothesis.column]], one) for one in found]
+    return [_to_finding(recording, columns[names[one.column]], one) for recording, one in found]
 
 
-def _to_finding(column: ColumnMapping, error: ColumnError) -> Finding:
+def _to_finding(recording: str, column: ColumnMapping, error: ColumnHypothesis) -> Finding:
     """Return the finding for an error of a column."""
     called = f"input `{column.name}`" if column.to else f"`{column.name}`"
-    if error.hypothesis.factor < 0:
+    if error.factor < 0:
         text = f"{called} has the wrong sign: it moves against what the model gives"
-        return Finding("sign", error.recording, column.name, text, "error")
-    way = "late" if error.hypothesis.lag > 0.0 else "early"
-    text = f"the clock of {called} is {abs(error.hypothesis.lag):.2f} s {way}"
-    return Finding("clock_offset", error.recording, column.name, text, "error")
+        return Finding("sign", recording, column.name, text, "error")
+    way = "late" if error.lag > 0.0 else "early"
+    text = f"the clock of {called} is {abs(error.lag):.2f} s {way}"
+    return Finding("clock_offset", recording, column.name, text, "error")
 
 
 def find_column_errors(
     candidate: Candidate, series: Sequence[SampledRecording]
-) -> list[ColumnError]:
-    """Return one error that is common to all recordings, else at most one error of each recording.
+) -> list[tuple[str, ColumnHypothesis]]:
+    """Return one error of all recordings (""), else at most one error of each recording, by name.
 
     Recordings not longer than four times `MAX_LAG` are left out. The error of a recording is its
     clearest hypothesis (`_clearest_hypothesis`), if it is similar to the others of that column. A
@@ -157,9 +149,9 @@ def find_column_errors(
     least = max(2.0, len(series) / 3.0)
     if shared and len(similar) > SHARED_FRACTION * len(errors) and len(similar) >= least:
         lag = median(one.lag for one in similar)
-        return [ColumnError(dataclasses.replace(shared, lag=lag), "")]
+        return [("", dataclasses.replace(shared, lag=lag))]
     return [  # different errors of a column indicate missing physics
-        ColumnError(own_error, one.name)
+        (one.name, own_error)
         for own_error, one in zip(own, series, strict=True)
         if own_error
         if all(e.is_similar(own_error) for e in errors if e.column == own_error.column)

@@ -10,8 +10,7 @@ from diagnosis.localisation.location_text import PLACE_PHRASES, format_location
 from diagnosis.model.placed_effect import PlacedEffect, place_path
 from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.number_text import format_quantity
-from diagnosis.result.effect_naming import verdict_id
-from diagnosis.result.verdict import NamedEffect
+from diagnosis.result.verdict import NamedEffect, verdict_id
 from diagnosis.selection.candidate_search import MIN_SCREENING_GAIN, CandidateFit
 from diagnosis.selection.forward_selection import Selection
 from diagnosis.validation.free_simulation import Misfit
@@ -133,8 +132,8 @@ def format_oscillation(report: DiagnosisReport) -> str:
 
 def format_experiment(report: DiagnosisReport) -> str:
     """Return the experiment to record in one sentence; "" without a plan."""
-    found = report.diagnosis.plan if report.diagnosis else None
-    return found.format_sentence() if found else ""
+    found = report.diagnosis
+    return found.plan.format_sentence() if found and found.plan else ""
 
 
 def format_reason(
