@@ -11,18 +11,16 @@ from engine.recordings.recording_window import paths_overlap, strip_window_suffi
 
 
 def require_disjoint(train: Sequence[str | Path], held_out: Sequence[str | Path]) -> None:
-    """Raise ValueError if two recordings overlap in a group, or a training and a held-out one do.
+    """Raise ValueError if two recordings of a group overlap, or a training and a held-out one.
 
-    Recordings overlap if they are the same file or copies of it and their time windows intersect. A
-    held-out file that cannot be read is an error as well. The contents of held-out files are not
-    opened, so among them and against the training files only equal paths count as the same file.
+    Recordings overlap if they are one file (or copies) and their windows intersect; contents of
+    held-out files are not opened. A held-out file that cannot be read is an error as well.
     """
     for one, other in itertools.combinations(train, 2):
         _require_no_overlap(other, "is named twice: each recording counts once", one)
+    twice = "is held out twice: each recording counts once"
     for one, other in itertools.combinations(held_out, 2):
-        _require_no_overlap(
-            other, "is held out twice: each recording counts once", one, opened=False
-        )
+        _require_no_overlap(other, twice, one, opened=False)
     for file in held_out:
         path = strip_window_suffix(Path(file))
         if not path.is_file() or not os.access(path, os.R_OK):
@@ -34,12 +32,8 @@ def require_disjoint(train: Sequence[str | Path], held_out: Sequence[str | Path]
 def _require_no_overlap(
     file: str | Path, reason: str, other: str | Path, opened: bool = True
 ) -> None:
-    """Raise ValueError with `reason` if `file` and `other` share values of a recording.
-
-    With `opened`, the contents are compared to recognise copies under another name.
-    """
+    """Raise ValueError with `reason` if two files share values; `opened` compares contents."""
     if paths_overlap(Path(file), Path(other), opened):
-        same = os.path.realpath(strip_window_suffix(Path(file))) == os.path.realpath(
-            strip_window_suffix(Path(other))
-        )
-        raise ValueError(f"{file} {reason}" if same else f"{file}, a copy of {other}, {reason}")
+        paths = {os.path.realpath(strip_window_suffix(Path(one))) for one in (file, other)}
+        copied = f", a copy of {other}," if len(paths) > 1 else ""
+        raise ValueError(f"{file}{copied} {reason}")

@@ -17,10 +17,8 @@ MAD_TO_STD = 1.4826
 def noise_of(values: Reals) -> float:
     """Return the standard deviation of the white noise in a signal (samples,); NaN is ignored.
 
-    It is the `NOISE_QUANTILE` (20 %) quantile, over windows of at least `WINDOW_SAMPLES` (50)
-    second differences, of 1.4826 times their median magnitude, divided by the square root of 6
-    (second differences of white noise have 6 times its variance). It is at least the standard
-    deviation of the quantisation, `quantum_of` / sqrt(12), and 0 for fewer than 5 known values.
+    It is the `NOISE_QUANTILE` of windows by the median second difference, and at least that of the
+    quantisation, `quantum_of` / sqrt(12); 0 for fewer than 5 known values.
     """
     known = values[np.isfinite(values)]
     if len(known) < 5:
@@ -31,17 +29,9 @@ def noise_of(values: Reals) -> float:
 
 
 def _window_medians(sizes: Reals) -> Reals:
-    """Return the median of each window of `sizes` (n,), in order of time.
-
-    The windows have at least `WINDOW_SAMPLES` values (one window if there are fewer); the first
-    windows have one value more if n is not a multiple of their number.
-    """
-    count = max(1, len(sizes) // WINDOW_SAMPLES)
-    width, more = divmod(len(sizes), count)
-    edge = more * (width + 1)
-    longer, others = sizes[:edge].reshape(more, width + 1), sizes[edge:].reshape(-1, width)
-    found = [np.median(part, axis=1) for part in (longer, others) if len(part)]
-    return np.concatenate(found)
+    """Return the median of each window of `sizes` (n,), of `WINDOW_SAMPLES` or more, in order."""
+    windows = np.array_split(sizes, max(1, len(sizes) // WINDOW_SAMPLES))
+    return np.array([np.median(window) for window in windows])
 
 
 def quantum_of(values: Reals) -> float:

@@ -7,11 +7,9 @@ from pathlib import Path
 
 
 def distinguish_file_names(paths: Sequence[Path]) -> Mapping[Path, str]:
-    """Return a display name for each path: the file name, with parent folders if names repeat.
+    """Return the file name of each path, with as many parent folders as make names unique.
 
-    All names have the same number of trailing path components, joined with `/`: the smallest number
-    that makes all of them different. If two paths are the same absolute path (links are not
-    resolved), all names are absolute paths.
+    Names are absolute paths if two paths are the same.
     """
     absolute = {path: path.absolute().parts for path in paths}
     names: dict[Path, str] = {}
@@ -25,8 +23,7 @@ def distinguish_file_names(paths: Sequence[Path]) -> Mapping[Path, str]:
 def recording_names(train: Sequence[Path], held_out: Sequence[Path]) -> Mapping[Path, str]:
     """Return a unique display name for each training and held-out recording.
 
-    Each group is named by itself. If a held-out recording has the name of a training recording, the
-    held-out names get as many folders as make all names of both groups different.
+    Only the held-out names get folders if the groups share a name.
     """
     learnt, own = distinguish_file_names(train), distinguish_file_names(held_out)
     if set(learnt.values()) & set(own.values()):

@@ -1,10 +1,8 @@
 """Sampled recordings: recordings on a uniform time grid, for one-step prediction.
 
-The grid has the period of the fastest channel and begins at a sample of a compared channel. Each
-measured value belongs to its nearest sample; a compared channel is NaN at samples without a value.
-An input is held (zero-order hold), or linear between its time stamps if the recording map says
-`hold: linear`. An input with two values is held, and without `hold` in the map the others may be
-either.
+Each measured value belongs to its nearest sample. An input is held (zero-order hold), or linear
+between its time stamps with `hold: linear` in the recording map. An input with two values is held;
+without `hold` the others may be either.
 """
 
 from __future__ import annotations
@@ -52,10 +50,8 @@ Hold = Literal["previous", "linear"] | None
 class SampledRecording:
     """A recording on a uniform grid: `inputs` (samples, inputs) and `measured` (samples, outputs).
 
-    `measured` is NaN where an output has no value. `period` is the time [s] between samples and
-    `start` the time [s] of the first one. Between samples an input is linear if its entry of
-    `holds` is "linear", constant if it is "previous", and without an entry (None) linear with
-    `is_first_order_hold`, else constant.
+    `measured` is NaN where an output has no value; `period` and `start` are in s. An input whose
+    entry of `holds` is None (or missing) is linear with `is_first_order_hold`, else constant.
     """
 
     name: str
@@ -87,8 +83,8 @@ class SampledRecording:
     def reference_time(self) -> float:
         """The time [s] of which burn-in, windows and memories of disturbances are multiples.
 
-        It is `REFERENCE_TIME` (0.2 s) if that is between five periods and a tenth of the length,
-        else the geometric mean of period and length.
+        It is `REFERENCE_TIME` if that is between five periods and a tenth of the length, else the
+        geometric mean of period and length.
         """
         period, length = float(self.period), float(self.period) * max(self.count, 1)
         is_shown = MIN_PERIODS * period <= REFERENCE_TIME <= length / MIN_TIMES
@@ -119,17 +115,12 @@ class SampledRecording:
     @cached_property
     def noise(self) -> tuple[Reals, Reals]:
         """The noise standard deviations by `noise_of`: (outputs,) and (inputs,)."""
-        seen, inputs = (
-            [noise_of(column) for column in values.T] for values in (self.measured, self.inputs)
-        )
-        return np.array(seen), np.array(inputs)
+        seen = np.array([noise_of(column) for column in self.measured.T])
+        return seen, np.array([noise_of(column) for column in self.inputs.T])
 
 
 def compared_outputs(mapping: RecordingMap, automaton: Automaton) -> tuple[str, ...]:
-    """Return the outputs that a recording map compares, in the order of the automaton.
-
-    A `compare` in the map that is no output of the automaton is left out.
-    """
+    """Return the outputs of an automaton that a recording map compares, in its order."""
     mapped = {column.compare for column in mapping.columns.values() if column.compare}
     return tuple(name for name in automaton.outputs if name in mapped)
 
@@ -137,19 +128,15 @@ def compared_outputs(mapping: RecordingMap, automaton: Automaton) -> tuple[str, 
 def sample_windows(
     recording: Recording, mapping: RecordingMap, automaton: Automaton, output_names: Sequence[str]
 ) -> tuple[SampledRecording, ...]:
-    """Return one sampled recording for each window of a recording (one if it has no windows).
+    """Return one sampled recording for each window of a recording.
 
-    The grid is that of `sample_recording`. Inputs without a channel have the constant of the map,
-    or else their declared default; KeyError if they have neither. Raises ValueError if a window has
-    too few samples.
+    Inputs without a channel have the constant of the map, else their default; KeyError without
+    both. Raises ValueError if a window has too few samples.
     """
-    constants = {name: float(value) for name, (value, _) in mapping.constants.items()}
-    declared = {
-        name: float(thing.default)
-        for name, thing in automaton.inputs.items()
-        if thing.default is not None
+    known = {
+        n: float(one.default) for n, one in automaton.inputs.items() if one.default is not None
     }
-    known = {**declared, **constants}
+    known |= {name: float(value) for name, (value, _) in mapping.constants.items()}
     return tuple(
         sample_recording(piece, list(automaton.inputs), output_names, known)
         for piece in split_by_windows(recording)
@@ -161,53 +148,44 @@ def sample_recording(
     inputs: Sequence[str],
     output_names: Sequence[str],
     defaults: Mapping[str, float],
-    period: Fraction | None = None,
 ) -> SampledRecording:
-    """Return a recording on the uniform grid of its fastest channel, or on a grid of `period` [s].
+    """Return a recording on the grid of its fastest channel.
 
-    The grid begins at the first time stamp of the fastest compared channel at which all channels
-    are known, and ends with the channel that ends first. The columns are `inputs` and
-    `output_names` in their order: an input without a channel is constant at its value in `defaults`
-    (KeyError without one), an output without a channel is NaN. Other channels are ignored. Raises
-    ValueError if a used channel has fewer than two values or the grid fewer than two samples.
+    The grid begins at the first stamp of the fastest compared channel at which all channels are
+    known, and ends with the channel that ends first. An input without a channel is constant at its
+    value in `defaults` (KeyError), an output without one is NaN. Raises ValueError for fewer than
+    two samples.
     """
-    input_channels = {
-        c.column.to: c for c in recording.channels.values() if c.column.to is not None
-    }
-    output_channels = {c.column.compare: c for c in recording.channels.values() if c.column.compare}
-    used = [
-        *input_channels.values(),
-        *(output_channels[name] for name in output_names if name in output_channels),
-    ]
+    driven = {c.column.to: c for c in recording.channels.values() if c.column.to is not None}
+    seen = {c.column.compare: c for c in recording.channels.values() if c.column.compare}
+    compared = [seen[name] for name in output_names if name in seen]
+    used = [*driven.values(), *compared]
     short = next((channel for channel in used if len(channel.times) < 2), None)
     if short is not None:
         raise ValueError(f"{recording.name}: `{short.column.name}` has one sample only")
     end = min(channel.times[-1] for channel in used)
-    start = _first_common_stamp(
-        [output_channels[name] for name in output_names if name in output_channels], used
-    )
-    step = period or min(grid_period(channel.times) for channel in used)
+    common = max(channel.times[0] for channel in used)
+    fastest = min(compared, key=lambda channel: grid_period(channel.times))
+    start = next((time for time in fastest.times if time >= common), common)
+    step = min(grid_period(channel.times) for channel in used)
     count = int((end - start) / step + MAX_SLIP) + 1
     if count < 2:
         raise ValueError(f"{recording.name}: only {count} samples in common")
-    input_values = np.stack(
-        [
-            _sample_input(input_channels.get(name), start, step, count, defaults, name)
-            for name in inputs
-        ]
-    )
-    output_values = np.stack(
-        [_sample_output(output_channels.get(name), start, step, count) for name in output_names]
-    )
+    columns = [
+        _sample_input(driven[name], start, step, count)
+        if name in driven
+        else np.full(count, defaults[name])
+        for name in inputs
+    ]
+    measured = [_sample_output(seen.get(name), start, step, count) for name in output_names]
     return SampledRecording(
         recording.name,
         step,
         start,
-        np.ascontiguousarray(input_values.T),
-        np.ascontiguousarray(output_values.T),
+        np.stack(columns, axis=1),
+        np.stack(measured, axis=1),
         holds=tuple(
-            _hold_of(input_channels.get(name), values)
-            for name, values in zip(inputs, input_values, strict=True)
+            _hold_of(driven.get(name), column) for name, column in zip(inputs, columns, strict=True)
         ),
     )
 
@@ -220,11 +198,7 @@ def _hold_of(channel: Channel | None, values: Reals) -> Hold:
 
 
 def has_feedthrough(automaton: Automaton, output_names: Sequence[str]) -> bool:
-    """Return whether a compared output depends on an input algebraically (direct feed-through).
-
-    The dependence is searched along the equations of all modes together, from the source of each
-    output in `output_names`; a path through a state does not count.
-    """
+    """Return whether a compared output depends on an input algebraically, not through a state."""
     edges: dict[str, set[str]] = {}
     for mode in automaton.all_modes:
         for name, formula in mode.equations.items():
@@ -247,11 +221,9 @@ def resample(
 ) -> tuple[SampledRecording, ...]:
     """Return recordings with the given hold, decimated if no compared output has feed-through.
 
-    The period [s] is the given one, or the longest one that follows the dynamics of the model
-    (`time_resolution`), is at most `DECIMATED_PERIOD` and leaves `DECIMATED_COUNT` samples.
-    With direct feed-through (`has_feedthrough`) the recordings keep their samples and only the hold
-    is set, because an output that follows the mean of an input was never measured. Raises
-    ValueError as `decimate`.
+    An output that follows the mean of an input was never measured. The default `period` [s] follows
+    the dynamics (`time_resolution`), is at most `DECIMATED_PERIOD` and leaves `DECIMATED_COUNT`
+    samples. Raises ValueError as `decimate`.
     """
     if has_feedthrough(automaton, output_names):
         return tuple(
@@ -266,10 +238,9 @@ def resample(
 def share_period(
     series: Sequence[SampledRecording], period: Fraction | None = None
 ) -> tuple[SampledRecording, ...]:
-    """Return recordings with one period: the given one [s], or the longest of the recordings.
+    """Return recordings interpolated to the given period [s], or to the longest one of them.
 
-    Periods that differ by the rounding of stamps alone count as equal, see `MAX_SHARED_SLIP`; of
-    these the one of the recording with most samples is taken. Other recordings are interpolated.
+    Periods within `MAX_SHARED_SLIP` are equal; that of the most samples is taken.
     """
     if period is None:
         different: list[Fraction] = []
@@ -293,8 +264,7 @@ def _has_period(series: SampledRecording, period: Fraction) -> bool:
 def interpolate(series: SampledRecording, period: Fraction) -> SampledRecording:
     """Return a recording at another period [s], with signals linear between its samples.
 
-    An input whose hold is "previous" keeps its value until the next sample instead. Samples next to
-    an unknown value (NaN) are unknown. The last sample is not after that of `series`.
+    A "previous" input keeps its value until the next sample. Samples next to NaN are NaN.
     """
     count = int((series.count - 1) * series.period / period) + 1
     places = np.arange(count) * float(period / series.period)
@@ -321,11 +291,8 @@ def decimate(
 ) -> SampledRecording:
     """Return a recording decimated by an integer factor n, to a period of at most `longest` [s].
 
-    n is `longest` over the period, rounded down and at least 1; samples after the last
-    full group of n are dropped. Outputs are the first of each n samples (no filter). A held input
-    is the mean of the n samples; an input with first-order hold is the mean over a centred window
-    of n samples (n + 1 if n is even), with the edge values repeated. The cost of a fit is
-    proportional to the number of samples. Raises ValueError for fewer than n samples.
+    Outputs are the first of each n samples (no filter). A held input is the mean of the n samples,
+    one with first-order hold the mean over a centred window. Raises ValueError below n samples.
     """
     series = dataclasses.replace(series, is_first_order_hold=is_first_order_hold)
     factor = max(1, int(longest / series.period))
@@ -352,10 +319,8 @@ def decimate(
 def grid_period(times: Sequence[Fraction]) -> Fraction:
     """Return the period [s] of a uniform grid through increasing time stamps (at least two).
 
-    The median difference tells how many periods lie between neighbouring stamps, so that gaps and
-    jitter do not count; the period is the duration over their sum. The result is the simplest
-    fraction with which the last stamp moves by at most `MAX_SLIP` (a tenth) of a period. Stamps
-    that are uniform have their exact period.
+    Gaps and jitter do not count. It is the simplest fraction with which the last stamp moves by at
+    most `MAX_SLIP` of a period; uniform stamps have their exact period.
     """
     first = times[1] - times[0]
     if all(late - early == first for early, late in pairwise(times)):
@@ -370,10 +335,7 @@ def grid_period(times: Sequence[Fraction]) -> Fraction:
 
 
 def simplest_fraction(low: Fraction, high: Fraction) -> Fraction:
-    """Return the fraction with the smallest denominator in an interval, 0 < low <= high.
-
-    The continued fractions of both ends agree up to the partial quotient that is shortened.
-    """
+    """Return the fraction with the smallest denominator in an interval, 0 < low <= high."""
     whole = low.numerator // low.denominator
     if low == whole:
         return Fraction(whole)
@@ -382,37 +344,13 @@ def simplest_fraction(low: Fraction, high: Fraction) -> Fraction:
     return whole + 1 / simplest_fraction(1 / (high - whole), 1 / (low - whole))
 
 
-def _first_common_stamp(
-    compared_channels: Sequence[Channel], used_channels: Sequence[Channel]
-) -> Fraction:
-    """Return the first stamp [s] of the fastest compared channel at which all used channels have
-    begun.
-
-    It is the time at which the last channel begins if the fastest channel has no later stamp.
-    """
-    common = max(channel.times[0] for channel in used_channels)
-    fastest = min(compared_channels, key=lambda channel: grid_period(channel.times))
-    return next((time for time in fastest.times if time >= common), common)
-
-
 def _sample_indices(channel: Channel, start: Fraction, step: Fraction) -> NDArray[np.int64]:
-    """Return the index of the nearest sample of the grid for each value of a channel;
-    may be outside.
-    """
+    """Return the nearest grid index of each value of a channel; it may be outside the grid."""
     return np.rint((channel.seconds - float(start)) / float(step)).astype(np.int64)
 
 
-def _sample_input(
-    channel: Channel | None,
-    start: Fraction,
-    step: Fraction,
-    count: int,
-    defaults: Mapping[str, float],
-    name: str,
-) -> Reals:
-    """Return an input on the grid (count,): held or interpolated; a constant without a channel."""
-    if channel is None:
-        return np.full(count, defaults[name])
+def _sample_input(channel: Channel, start: Fraction, step: Fraction, count: int) -> Reals:
+    """Return an input on the grid (count,), held or interpolated."""
     if channel.column.hold == "linear":
         grid = float(start) + float(step) * np.arange(count)
         return np.asarray(np.interp(grid, channel.seconds, channel.array), dtype=np.float64)
@@ -422,10 +360,7 @@ def _sample_input(
 
 
 def _sample_output(channel: Channel | None, start: Fraction, step: Fraction, count: int) -> Reals:
-    """Return an output on the grid (count,), NaN at samples without a value.
-
-    All values are NaN without a channel.
-    """
+    """Return an output on the grid (count,), NaN at samples without a value."""
     values = np.full(count, np.nan)
     if channel is not None:
         places = _sample_indices(channel, start, step)

@@ -20,10 +20,7 @@ CACHE_SIZE = 24
 
 @dataclass(frozen=True)
 class StackedExperiments:
-    """A set of recordings as concatenated arrays, with the first known values of their outputs.
-
-    `first_measured` has the shape (recordings, outputs).
-    """
+    """Recordings as concatenated arrays; `first_measured` is (recordings, outputs)."""
 
     series: tuple[SampledRecording, ...]
     recorded: StackedRecordings
@@ -34,18 +31,14 @@ _cache: OrderedDict[tuple[int, ...], StackedExperiments] = OrderedDict()
 
 
 def burn_in_samples(series: SampledRecording) -> int:
-    """Return the samples in the burn-in of a recording: `BURN_IN` (2.5) reference times.
-
-    It may exceed the number of samples of a recording of less than seven.
-    """
+    """Return the samples of the burn-in, which may exceed those of a short recording."""
     return series.sample_count(BURN_IN)
 
 
 def stack_recordings(series: Sequence[SampledRecording]) -> StackedExperiments:
     """Return recordings concatenated in their order; the last `CACHE_SIZE` (24) sets are cached.
 
-    The cache key is the identity of the recordings, so the same objects give the same result
-    object. An entry holds its recordings, so no other object can have the same identity meanwhile.
+    The cache key is the identity of the recordings, which an entry keeps alive.
     """
     key = tuple(id(one) for one in series)
     stacked = _cache.get(key)

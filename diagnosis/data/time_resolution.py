@@ -38,10 +38,9 @@ MAX_RATE_RATIO = 2.0
 def time_resolution(automaton: Automaton, longest: Fraction) -> Fraction:
     """Return the longest step [s] that follows the fastest damped component of a model.
 
-    It is `STEP_RATE_PRODUCT` over the largest magnitude of an eigenvalue at the declared
-    parameters, over all modes, at most `longest` and at least `SHORTEST_STEP`. The eigenvalues are
-    those of the affine terms, and those of the tangent at rest: a smooth friction is steepest
-    there. Sampled automata and exponential methods give `longest`.
+    It is `STEP_RATE_PRODUCT` over the largest eigenvalue of affine terms and of the tangent at rest
+    (a smooth friction is steepest there), in `SHORTEST_STEP` to `longest`. Sampled automata and
+    exponential methods give `longest`.
     """
     if automaton.is_sampled:
         return longest
@@ -52,11 +51,10 @@ def time_resolution(automaton: Automaton, longest: Fraction) -> Fraction:
 
 
 def rate_at_rest(automaton: Automaton) -> float:
-    """Return the largest magnitude [1/s] of a damped eigenvalue where all variables are about 0.
+    """Return the largest damped |eigenvalue| [1/s] where all variables are about 0.
 
-    The flow of each mode is differentiated where they are `NEARLY_ZERO`, beside the corner of an
-    absolute value. Modes without a derivative are left out; 0 if no component is damped, or if the
-    tangent is singular, as that of a square root.
+    They are `NEARLY_ZERO`, beside the corner of an absolute value. 0 if no component is damped, or
+    if the tangent is singular, as that of a square root.
     """
     rates = [_rate_at(automaton, value) for value in NEARLY_ZERO]
     return max(rates) if max(rates) <= MAX_RATE_RATIO * min(rates) else 0.0

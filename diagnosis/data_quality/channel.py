@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.data.array_types import Reals
-from diagnosis.data_quality.finding import Finding
+from diagnosis.data_quality.finding import Finding, Severity
 from engine.recordings.recording import Channel, Recording
 
+Interval = tuple[float, float]
+"""Start and end of an interval [s]."""
 GAP_FACTOR = 1.5
 """A time step above this multiple of the median step has lost samples."""
 LONG_GAP_FACTOR = 10.0
@@ -38,11 +40,8 @@ QUANTUM_TOLERANCE = 0.02
 class ChannelCheck:
     """Properties of one channel; times in s, values in SI (`factor` times those in `unit`).
 
-    `rate` [1/s] and `jitter` (95th percentile of deviations [s]) refer to steps without lost
-    samples. `dropped` is the fraction of missing samples and `gaps` are the long gaps. `quantum` is
-    the quantisation step, 0 if there is none; `noise` is the standard deviation from third
-    differences. `repeated` and `clipped` are fractions of samples; `stuck` is the longest constant
-    interval.
+    `rate` [1/s] and `jitter` (95th percentile [s]) are of steps without lost samples; `dropped`,
+    `repeated` and `clipped` are fractions of samples. `quantum` is 0 without quantisation.
     """
 
     recording: str
@@ -56,23 +55,18 @@ class ChannelCheck:
     rate: float
     jitter: float
     dropped: float
-    gaps: tuple[tuple[float, float], ...]
+    gaps: tuple[Interval, ...]
     quantum: float
     noise: float
     low: float
     high: float
     repeated: float
     clipped: float
-    stuck: tuple[float, float] | None
+    stuck: Interval | None
 
 
 def check_channel(recording: Recording, channel: Channel) -> ChannelCheck:
-    """Return the properties of a channel; it must have a value.
-
-    A step above `GAP_FACTOR` (1.5) median steps has lost samples, and one above `LONG_GAP_FACTOR`
-    (10) is a gap. `signal` is the input or output of the map, else the name of the column. Rate,
-    jitter, noise and quantum are 0 if there are too few values.
-    """
+    """Return the properties of a channel with values; those that need more values are 0."""
     times, values = channel.seconds, channel.array
     steps = np.diff(times)
     usual = float(np.median(steps)) if len(steps) else 0.0
@@ -106,24 +100,15 @@ def check_channel(recording: Recording, channel: Channel) -> ChannelCheck:
 
 
 def channel_findings(check: ChannelCheck, is_compared: bool) -> list[Finding]:
-    """Return the findings on a channel, at most three of them gaps, in a fixed order of kinds.
-
-    The kinds are no_signal (constant; only if `is_compared`), dropped (from `SOME_DROPPED` 1 % on,
-    an error from `MUCH_DROPPED` 10 % on), gap, jitter (above `JITTER_FRACTION` of a step), repeated
-    (from `MUCH_REPEATED` 8 % on, an error from 10 % on), stuck and clipped (from `CLIPPED_FRACTION`
-    1 % on).
-    """
+    """Return the findings on a channel, at most three of them gaps, in a fixed order of kinds."""
     findings: list[Finding] = []
 
-    def report(
-        kind: str, text: str, severity: str, window: tuple[float, float] | None = None
-    ) -> None:
-        findings.append(
-            Finding(kind, check.recording, check.name, text, severity, window)  # type: ignore[arg-type]
-        )
+    def report(kind: str, text: str, severity: Severity, window: Interval | None = None) -> None:
+        findings.append(Finding(kind, check.recording, check.name, text, severity, window))
 
     if check.low == check.high and is_compared:
         report("no_signal", f"is {check.low:g} all the time: the signal is missing", "error")
+    severity: Severity
     if check.dropped >= SOME_DROPPED:
         severity = "error" if check.dropped >= MUCH_DROPPED else "warning"
         report("dropped", f"{check.dropped:.0%} of its samples are missing", severity)
@@ -161,10 +146,7 @@ def _quantum(values: Reals) -> float:
 
 
 def _noise(times: Reals, values: Reals, period: float) -> float:
-    """Return the standard deviation of white noise from the median third difference.
-
-    Differences over uneven time steps are left out; the result is 0 for fewer than 10 values.
-    """
+    """Return the standard deviation of white noise from third differences at even steps."""
     if len(values) < MIN_SAMPLES:
         return 0.0
     third = np.diff(values, 3)
@@ -176,10 +158,9 @@ def _noise(times: Reals, values: Reals, period: float) -> float:
 
 
 def _repeated_fraction(values: Reals, quantum: float, noise: float) -> float:
-    """Return the fraction of values equal to the previous one, beyond the effect of quantisation.
+    """Return the fraction of values equal to the previous one, beyond quantisation.
 
-    For white noise of standard deviation s and quantum q, equal neighbours have the probability q /
-    (2 sqrt(pi) s). Long runs do not count.
+    White noise s with quantum q has equal neighbours with probability q / (2 sqrt(pi) s).
     """
     changes = np.abs(np.diff(values))
     changes = changes[changes > 0.0]
@@ -200,12 +181,8 @@ def _runs_of_equal(equal: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _stuck_interval(
-    times: Reals, values: Reals, quantum: float, noise: float
-) -> tuple[float, float] | None:
-    """Return the longest interval in which a noisy channel keeps one nonzero value;
-    None if short.
-    """
+def _stuck_interval(times: Reals, values: Reals, quantum: float, noise: float) -> Interval | None:
+    """Return the longest interval with one nonzero value in a noisy channel; None if short."""
     if noise <= 0.5 * quantum or noise <= 0.0:
         return None
     runs = [run for run in _runs_of_equal(np.diff(values) == 0.0) if values[run[0]] != 0.0]

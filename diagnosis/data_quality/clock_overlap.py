@@ -19,13 +19,7 @@ ONE_CLOCK = ": do their clocks have one unit and one start?"
 
 
 def find_clock_mismatches(recording: Recording) -> list[Finding]:
-    """Return an error for the first pair of channels, per pair of clocks, that share too little
-    time.
-
-    The spans of two channels must overlap; those of two time columns must have at least
-    `MIN_SHARED_FRACTION` (1 %) of the longer one in common. Channels with fewer than `MIN_SAMPLES`
-    (10) samples and channels whose own stamps leap are left out.
-    """
+    """Return an error for the first channels of each pair of clocks with `lacking_overlap`."""
     found: dict[tuple[str, str], Finding] = {}
     channels = [one for one in recording.channels.values() if is_continuous(one.seconds)]
     for first, second in itertools.combinations(channels, 2):
@@ -39,9 +33,9 @@ def find_clock_mismatches(recording: Recording) -> list[Finding]:
 
 
 def lacking_overlap(first: Reals, second: Reals, is_other_clock: bool) -> str:
-    """Return the time in common of two sequences of stamps [s] as text; "" if they share enough.
+    """Return the common time of two sequences of stamps [s] as text; "" if they share enough.
 
-    They must overlap, those of two clocks by at least `MIN_SHARED_FRACTION` (1 %) of the longer.
+    They must overlap, those of two clocks by `MIN_SHARED_FRACTION` (1 %) of the longer.
     """
     shared = float(min(first[-1], second[-1]) - max(first[0], second[0]))
     least = MIN_SHARED_FRACTION * max(_duration(first), _duration(second))

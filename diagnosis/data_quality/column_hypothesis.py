@@ -1,9 +1,7 @@
-"""Column hypothesis: columns of a recording with a wrong clock or sign, found by the prediction
-error.
+"""Column hypothesis: columns with a wrong clock or sign, found by the prediction error.
 
-Each column is shifted in time or negated. If the declared model then predicts far better, the
-column has that error. Unknown loads, wrong parameters and missing physics increase the prediction
-errors with and without the change.
+A column that is shifted in time or negated, and then predicted far better, has that error. Unknown
+loads, wrong parameters and missing physics increase the errors in both cases.
 """
 
 from __future__ import annotations
@@ -61,10 +59,7 @@ UNUSED_FACTOR = 1e-6
 
 @dataclass(frozen=True)
 class ColumnHypothesis:
-    """A change of a column: advanced by `lag` [s], negated (`factor` -1) or not used (`factor` 0).
-
-    `column` counts the inputs first, then the compared outputs.
-    """
+    """A column (inputs, then outputs) advanced by `lag` [s] and negated (-1) or unused (0)."""
 
     column: int
     lag: float = 0.0
@@ -72,27 +67,13 @@ class ColumnHypothesis:
 
     @property
     def is_error(self) -> bool:
-        """Whether the change is an error: a negation, or a lag from `MIN_LAG` (0.1 s) on.
-
-        False for a smaller lag, which is usual, and for an input that is not used.
-        """
+        """Whether the change is a negation or a lag of at least `MIN_LAG` (0.1 s)."""
         return self.factor < 0 or abs(self.lag) >= MIN_LAG
 
     def is_similar(self, other: ColumnHypothesis) -> bool:
-        """Return whether two hypotheses have the same column and factor, and lags within 0.06 s.
-
-        The limit is `CLOCK_TOLERANCE`.
-        """
+        """Return whether column and factor are equal and lags differ by at most 0.06 s."""
         near = abs(self.lag - other.lag) <= CLOCK_TOLERANCE
         return near and (self.column, self.factor) == (other.column, other.factor)
-
-
-@dataclass(frozen=True)
-class ColumnError:
-    """The correction of an error in one recording, or in all of them if `recording` is ""."""
-
-    hypothesis: ColumnHypothesis
-    recording: str
 
 
 def find_clock_and_sign_errors(
@@ -102,12 +83,10 @@ def find_clock_and_sign_errors(
     mapping: RecordingMap,
     recordings: Sequence[Recording],
 ) -> list[Finding] | None:
-    """Return findings on wrong clocks and signs, or None if the model cannot be used.
+    """Return errors on clocks and signs, or None if the model cannot be used.
 
-    The findings are errors of kind `sign` or `clock_offset`, those of `find_column_errors`. A
-    window with too few samples (`sample_windows`, `decimate`), or without a value of an input, is
-    left out. None is returned if no window remains, if the model does not compile or no C compiler
-    works, or if the model cannot be linearised.
+    Windows that cannot be sampled are left out. None if no window remains, or the model does not
+    compile or cannot be linearised.
     """
     seen = compared_outputs(mapping, automaton)
     sampled: list[SampledRecording] = []
@@ -130,36 +109,29 @@ def find_clock_and_sign_errors(
         return None
     names = [*automaton.inputs, *seen]
     columns = {column.to or column.compare: column for column in mapping.columns.values()}
-    return [_to_finding(columns[names[one.hypothesis.column]], one) for one in found]
+    return [_to_finding(recording, columns[names[one.column]], one) for recording, one in found]
 
 
-def _to_finding(column: ColumnMapping, error: ColumnError) -> Finding:
+def _to_finding(recording: str, column: ColumnMapping, error: ColumnHypothesis) -> Finding:
     """Return the finding for an error of a column."""
     called = f"input `{column.name}`" if column.to else f"`{column.name}`"
-    if error.hypothesis.factor < 0:
+    if error.factor < 0:
         text = f"{called} has the wrong sign: it moves against what the model gives"
-        return Finding("sign", error.recording, column.name, text, "error")
-    way = "late" if error.hypothesis.lag > 0.0 else "early"
-    text = f"the clock of {called} is {abs(error.hypothesis.lag):.2f} s {way}"
-    return Finding("clock_offset", error.recording, column.name, text, "error")
+        return Finding("sign", recording, column.name, text, "error")
+    way = "late" if error.lag > 0.0 else "early"
+    text = f"the clock of {called} is {abs(error.lag):.2f} s {way}"
+    return Finding("clock_offset", recording, column.name, text, "error")
 
 
 def find_column_errors(
     candidate: Candidate, series: Sequence[SampledRecording]
-) -> list[ColumnError]:
-    """Return one error that is common to all recordings, else at most one error of each recording.
+) -> list[tuple[str, ColumnHypothesis]]:
+    """Return one error of all recordings (""), else at most one error of each recording, by name.
 
-    Recordings not longer than four times `MAX_LAG` (0.48 s) are left out; without any other one the
-    result is empty. The error of a recording is the hypothesis with the largest gain. It has to be
-    an error (`is_error`), to gain `MIN_GAIN` (100 nats) and `MIN_GAIN_PER_SAMPLE` (0.2) times the
-    samples, and to exceed the gains of small lags and unused inputs by `HARMLESS_GAIN_FACTOR` and
-    those of other columns by `OTHER_COLUMN_FACTOR`.
-
-    A common error meets the same conditions for the sums over all recordings in which the model
-    does not diverge. At least two recordings, a third of all and more than `SHARED_FRACTION` of
-    those with an error must have one that is similar to it; the lag is their median, and the result
-    has no other error. Otherwise an error of a recording counts only if each recording with an
-    error in the same column has a similar one.
+    Recordings not longer than four times `MAX_LAG` are left out. The error of a recording is its
+    clearest hypothesis (`_clearest_hypothesis`), if it is similar to the others of that column. A
+    common error is clear in the sum of gains, and similar to those of two recordings, a third of
+    all and `SHARED_FRACTION` of those with an error.
     """
     series = [one for one in series if float(one.period) * one.count > 4.0 * MAX_LAG]
     if not series:
@@ -174,31 +146,16 @@ def find_column_errors(
     shared = _clearest_hypothesis(whole, sum(min_gains)) if len(series) > 1 else None
     errors = [one for one in own if one]
     similar = [one for one in errors if shared and one.is_similar(shared)]
-    if (
-        shared
-        and len(similar) > SHARED_FRACTION * len(errors)
-        and len(similar) >= max(2.0, len(series) / 3.0)
-    ):
+    least = max(2.0, len(series) / 3.0)
+    if shared and len(similar) > SHARED_FRACTION * len(errors) and len(similar) >= least:
         lag = median(one.lag for one in similar)
-        return [ColumnError(dataclasses.replace(shared, lag=lag), "")]
-    named = zip(own, series, strict=True)
-    return [
-        ColumnError(hypothesis, one.name)
-        for hypothesis, one in named
-        if hypothesis and _is_uniform(hypothesis, own)
+        return [("", dataclasses.replace(shared, lag=lag))]
+    return [  # different errors of a column indicate missing physics
+        (one.name, own_error)
+        for own_error, one in zip(own, series, strict=True)
+        if own_error
+        if all(e.is_similar(own_error) for e in errors if e.column == own_error.column)
     ]
-
-
-def _is_uniform(
-    hypothesis: ColumnHypothesis, hypotheses: Sequence[ColumnHypothesis | None]
-) -> bool:
-    """Return whether a column has the same error in every recording that has one.
-
-    Different errors rather indicate missing physics.
-    """
-    return all(
-        one.is_similar(hypothesis) for one in hypotheses if one and one.column == hypothesis.column
-    )
 
 
 def hypothesis_gains(
@@ -206,9 +163,8 @@ def hypothesis_gains(
 ) -> Mapping[ColumnHypothesis, Reals]:
     """Return the log-likelihood gain [nats] of each hypothesis in each recording (recordings,).
 
-    Hypotheses are lags from -`MAX_LAG` to `MAX_LAG` in steps of `LAG_STEP` (without 0) and the
-    negation of each input and output, and each input not used. Inputs that are constant in a
-    recording are not tested. The gain is -inf in a recording where the model diverges.
+    Hypotheses are lags to `MAX_LAG` in steps of `LAG_STEP`, negations, and inputs not used;
+    constant inputs are not tested. The gain is -inf where the model diverges.
     """
     inputs = series[0].inputs.shape[1]
     moving_inputs = [
@@ -227,16 +183,17 @@ def hypothesis_gains(
     for hypothesis in hypotheses:
         right = [apply_hypothesis(one, hypothesis) for one in series]
         model = base if hypothesis.factor == 1 else _evaluate_declared(candidate, right)
-        found[hypothesis] = _finite_gains(before, _high_pass_costs(model, right))
+        after = _high_pass_costs(model, right)
+        known = np.isfinite(before) & np.isfinite(after)
+        found[hypothesis] = np.full(len(series), -np.inf)
+        found[hypothesis][known] = before[known] - after[known]
     return found
 
 
 def apply_hypothesis(series: SampledRecording, hypothesis: ColumnHypothesis) -> SampledRecording:
-    """Return the inner part of a recording with a hypothesis applied to its column.
+    """Return a recording with a hypothesis applied to its column, without `MAX_LAG` at both ends.
 
-    `MAX_LAG` seconds are cut off at both ends, so that every lag has values; the column is advanced
-    by the lag, rounded to samples, and multiplied by the factor (`UNUSED_FACTOR` instead of 0).
-    `start` of the result is still that of the recording.
+    The lag is rounded to samples; `start` of the result is still that of the recording.
     """
     margin = round(MAX_LAG / float(series.period))
     late = round(hypothesis.lag / float(series.period))
@@ -244,31 +201,23 @@ def apply_hypothesis(series: SampledRecording, hypothesis: ColumnHypothesis) -> 
     moved = slice(inside.start + late, inside.stop + late)
     factor = hypothesis.factor or UNUSED_FACTOR
     inputs, measured = series.inputs[inside].copy(), series.measured[inside].copy()
-    count = inputs.shape[1]
-    if hypothesis.column < count:
-        inputs[:, hypothesis.column] = factor * series.inputs[moved, hypothesis.column]
+    column, count = hypothesis.column, inputs.shape[1]
+    if column < count:
+        inputs[:, column] = factor * series.inputs[moved, column]
     else:
-        measured[:, hypothesis.column - count] = (
-            factor * series.measured[moved, hypothesis.column - count]
-        )
+        measured[:, column - count] = factor * series.measured[moved, column - count]
     return dataclasses.replace(series, inputs=inputs, measured=measured)
 
 
 def _evaluate_declared(candidate: Candidate, series: Sequence[SampledRecording]) -> Estimate:
     """Return the declared model with disturbances that let it follow the recordings."""
-    noise_levels = measured_noise_levels(series, {})
-    noise_levels = dataclasses.replace(
-        noise_levels, process=disturbance_units(candidate, series, {})
-    )
+    process = disturbance_units(candidate, series, {})
+    noise_levels = dataclasses.replace(measured_noise_levels(series, {}), process=process)
     return evaluate(candidate, series, noise_levels, vector_of(candidate, len(series), {}))
 
 
 def _high_pass_costs(model: Estimate, series: Sequence[SampledRecording]) -> Reals:
-    """Return the negative log-likelihood [nats] of the high-pass filtered innovations
-    (recordings,).
-
-    It is infinite for a recording in which the run diverged.
-    """
+    """Return -log L [nats] (recordings,) of high-pass innovations, inf for a diverged run."""
     values, found = [model.values(0)] * len(series), []
     (there,) = predict_at_points(
         model.candidate, series, [values], model.gains, model.noise_levels.huber_limits
@@ -277,18 +226,10 @@ def _high_pass_costs(model: Estimate, series: Sequence[SampledRecording]) -> Rea
         series, there.done.tolist(), there.by_recording, there.counts, strict=True
     ):
         quick = _high_pass(missed, float(one.period))
-        spread = np.log(np.maximum(_column_means(quick**2), 1e-300))
+        spread = np.log(np.maximum(np.nanmean(quick**2, axis=0), 1e-300))
         whole = done == one.count
         found.append(float(np.sum(0.5 * counts * spread)) if whole else np.inf)
     return np.array(found)
-
-
-def _column_means(squares: Reals) -> Reals:
-    """Return the mean of the known values of each column."""
-    if np.isnan(squares).any():
-        return np.asarray(np.nanmean(squares, axis=0), dtype=np.float64)
-    found: Reals = squares.sum(axis=0) / len(squares)
-    return found
 
 
 def _high_pass(innovations: Reals, period: float) -> Reals:
@@ -301,19 +242,10 @@ def _high_pass(innovations: Reals, period: float) -> Reals:
     return found
 
 
-def _finite_gains(before: Reals, after: Reals) -> Reals:
-    """Return the gains (recordings,), -inf where the
-    model diverges with or without the hypothesis.
-    """
-    known = np.isfinite(before) & np.isfinite(after)
-    found = np.where(known, before, 0.0) - np.where(known, after, 0.0)
-    return np.where(known, found, -np.inf)
-
-
 def _clearest_hypothesis(
     gains: Mapping[ColumnHypothesis, float], min_gain: float
 ) -> ColumnHypothesis | None:
-    """Return the hypothesis with the largest gain; None if that is not a clear error.
+    """Return the hypothesis of largest gain if it is a clear error, else None.
 
     Its gain must reach `min_gain` and exceed the gains of harmless changes and of other columns by
     their factors.
@@ -323,8 +255,5 @@ def _clearest_hypothesis(
         return None
     small = max([0.0, *[gain for one, gain in gains.items() if not one.is_error]])
     other = max([0.0, *[gain for one, gain in gains.items() if one.column != best.column]])
-    return (
-        best
-        if gains[best] > max(HARMLESS_GAIN_FACTOR * small, OTHER_COLUMN_FACTOR * other)
-        else None
-    )
+    least = max(HARMLESS_GAIN_FACTOR * small, OTHER_COLUMN_FACTOR * other)
+    return best if gains[best] > least else None

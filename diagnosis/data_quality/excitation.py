@@ -1,17 +1,16 @@
-"""Excitation: the steps, bands and ranges of recorded signals,
-and the effects that they can show.
-"""
+"""Excitation: steps, bands and ranges of recorded signals, and the effects they can show."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
+from scipy.signal import welch
 
 from diagnosis.data.array_types import Reals
-from diagnosis.data.spectrum import spectrum
 from diagnosis.data_quality.channel import ChannelCheck, check_channel
 from engine.recordings.recording import Channel, Recording, split_by_windows
 from language.expressions.units import PURE_NUMBER, are_compatible, parse_unit
@@ -91,9 +90,7 @@ SPEEDS, POSITIONS = ("rad/s", "m/s"), ("rad", "m")
 
 @dataclass(frozen=True)
 class SignalExcitation:
-    """The excitation of one signal: range [SI], sign changes,
-    step sizes [SI] and bandwidth [Hz].
-    """
+    """The excitation of a signal: range and steps [SI], sign changes and bandwidth [Hz]."""
 
     name: str
     unit: str
@@ -138,10 +135,8 @@ def analyse_excitation(
 ) -> Excitation:
     """Return the excitation of recordings, cut into the windows that are used.
 
-    `checks` give the noise of channels. Channels in units of speed are speeds, also if they are
-    inputs; a recording without a speed has the rates of its positions instead. Without another
-    input, speeds that are inputs count as inputs too. The effects are those of `EFFECT_NEEDS`, in
-    its order.
+    `checks` give the noise of channels. A recording without a speed has the rates of its positions
+    instead; without another input, speeds that are inputs count as inputs.
     """
     used = [
         _with_derived_speeds(piece)
@@ -162,14 +157,12 @@ def analyse_excitation(
     if not inputs:  # A speed that is an input is the only excitation.
         inputs = [s for s in speeds if used[0].channels[s.name].column.to is not None]
     met = _met_needs(used, inputs, speeds, checks)
-    effects = [
-        EffectTestability(
-            effect, tuple(NEED_DESCRIPTIONS[need] for need in needs if need not in met)
-        )
+    effects = tuple(
+        EffectTestability(effect, tuple(NEED_DESCRIPTIONS[n] for n in needs if n not in met))
         for effect, needs in EFFECT_NEEDS.items()
-    ]
+    )
     total = sum(float(piece.end - piece.start) for piece in used)
-    return Excitation(total, tuple(inputs), tuple(speeds), tuple(effects))
+    return Excitation(total, tuple(inputs), tuple(speeds), effects)
 
 
 def _with_derived_speeds(piece: Recording) -> Recording:
@@ -218,10 +211,7 @@ def _signal_excitation(
 
 
 def _step_sizes(times: Reals, values: Reals, span: float, floor: float) -> list[float]:
-    """Return the signed sizes of steps: changes within `STEP_TIME` well above the noise `floor`.
-
-    Each step is counted once.
-    """
+    """Return the signed sizes of changes within `STEP_TIME` well above the noise `floor`."""
     if len(values) < 3 or span <= 6.0 * floor:
         return []
     later = np.minimum(np.searchsorted(times, times + STEP_TIME), len(times) - 1)
@@ -260,6 +250,7 @@ def _met_needs(
 ) -> set[str]:
     """Return the needs that recordings meet."""
     sizes = [abs(size) for signal in inputs for size in signal.steps]
+    pairs = list(itertools.product(inputs, speeds))
     tests = {
         "fast": any(signal.steps or signal.band >= 5.0 for signal in inputs),
         "sampled_fast": max((check.rate for check in checks), default=0.0) >= 49.0,
@@ -274,44 +265,37 @@ def _met_needs(
         "turns": any(_revolutions(used, signal) >= 5.0 for signal in speeds),
         "moves": any(_time_moving(used, signal) >= 2.0 for signal in speeds),
         "brakes": any(_is_brake(signal) for signal in inputs),
+        "both_signs": any(_has_both_signs_at_one_speed(used, *pair) for pair in pairs),
+        "power": any(_has_power_range(used, *pair) for pair in pairs),
     }
-    met = {need for need, is_met in tests.items() if is_met}
-    if any(_has_both_signs_at_one_speed(used, i, s) for i in inputs for s in speeds):
-        met.add("both_signs")
-    if any(_has_power_range(used, i, s) for i in inputs for s in speeds):
-        met.add("power")
-    return met
+    return {need for need, is_met in tests.items() if is_met}
 
 
 def _is_brake(signal: SignalExcitation) -> bool:
     """Return whether an input is never negative and has at least two steps."""
-    return (
-        signal.high > 0.0
-        and signal.low >= -REVERSAL_FRACTION * signal.high
-        and len(signal.steps) >= 2
-    )
+    is_positive = signal.high > 0.0 and signal.low >= -REVERSAL_FRACTION * signal.high
+    return is_positive and len(signal.steps) >= 2
 
 
 def _revolutions(used: Sequence[Recording], signal: SignalExcitation) -> float:
     """Return the number of turns in both directions [1] by the integral of a speed's magnitude."""
-    angle = 0.0
-    for piece in used:
-        channel = piece.channels.get(signal.name)
-        if channel and len(channel.array) > 1:
-            angle += float(np.trapezoid(np.abs(channel.array), channel.seconds))
+    channels = _channels_of(used, signal)
+    angle = sum(float(np.trapezoid(np.abs(c.array), c.seconds)) for c in channels)
     return angle / (2.0 * np.pi)
 
 
 def _time_moving(used: Sequence[Recording], signal: SignalExcitation) -> float:
     """Return the time [s] for which a speed exceeds 5 % of its largest magnitude."""
-    largest = max(abs(signal.low), abs(signal.high))
-    time = 0.0
-    for piece in used:
-        channel = piece.channels.get(signal.name)
-        if channel and len(channel.array) > 1 and largest:
-            moving = np.abs(channel.array[1:]) > 0.05 * largest
-            time += float(np.diff(channel.seconds)[moving].sum())
-    return time
+    limit = 0.05 * max(abs(signal.low), abs(signal.high))
+    channels = _channels_of(used, signal)
+    steps = [np.diff(c.seconds)[np.abs(c.array[1:]) > limit] for c in channels]
+    return float(sum(moving.sum() for moving in steps))
+
+
+def _channels_of(used: Sequence[Recording], signal: SignalExcitation) -> list[Channel]:
+    """Return the channels of a signal with at least two values."""
+    channels = [piece.channels.get(signal.name) for piece in used]
+    return [channel for channel in channels if channel and len(channel.array) > 1]
 
 
 def _paired_samples(
@@ -330,10 +314,7 @@ def _paired_samples(
 def _has_both_signs_at_one_speed(
     used: Sequence[Recording], first: SignalExcitation, second: SignalExcitation
 ) -> bool:
-    """Return whether an input has both signs in one of eight speed classes.
-
-    Each sign must be in more than a tenth of the class's samples.
-    """
+    """Return whether each sign has a tenth of the samples of one of eight speed classes."""
     torque, speed = _paired_samples(used, first, second)
     if not len(torque) or second.low == second.high:
         return False
@@ -356,3 +337,15 @@ def _has_power_range(
     strong = np.abs(torque) > 0.6 * max(abs(first.low), abs(first.high))
     fast = np.abs(speed) > 0.6 * largest
     return bool((strong & fast).any() and (strong & ~fast).any())
+
+
+def spectrum(values: Reals, rate: float, max_window: int) -> tuple[Reals, Reals]:
+    """Return frequencies [Hz] and one-sided power spectral density (Welch 1967) at `rate` [Hz].
+
+    Hann windows of `max_window` samples (all if fewer) overlap by half.
+    """
+    length = min(len(values), max_window)
+    frequencies, power = welch(
+        values, rate, np.hanning(length), noverlap=length // 2, detrend="constant"
+    )
+    return frequencies, power

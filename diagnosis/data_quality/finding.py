@@ -30,10 +30,7 @@ class Finding:
 
 
 def sort_by_severity(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Return findings in the order error, warning, note, without equal ones.
-
-    The order within a severity stays.
-    """
+    """Return the distinct findings, errors first, notes last, in a stable order."""
     unique = dict.fromkeys(findings)
     return tuple(sorted(unique, key=lambda finding: SEVERITIES.index(finding.severity)))
 
@@ -41,10 +38,8 @@ def sort_by_severity(findings: Sequence[Finding]) -> tuple[Finding, ...]:
 def format_findings(findings: Sequence[Finding]) -> list[tuple[Severity, str]]:
     """Return one line for each group of findings of one severity and kind, with its severity.
 
-    Errors come first, notes last; within a severity the order is that of first findings. A line is
-    "`a`, `b` (files): text" with the text of the first finding; a text that names its channel in
-    backticks is followed by ", and N more like that (files)" instead. Kinds in `UNGROUPED_KINDS`
-    form a group for each text. Equal findings are listed once.
+    Errors come first. The text is that of the first finding of a group; kinds in `UNGROUPED_KINDS`
+    form a group for each text.
     """
     groups: dict[tuple[Severity, str, str], list[Finding]] = {}
     for finding in sort_by_severity(findings):

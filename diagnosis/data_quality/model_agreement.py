@@ -14,8 +14,7 @@ from fractions import Fraction
 import numpy as np
 
 from diagnosis.data.array_types import Reals
-from diagnosis.data_quality.output_comparison import OutputComparison
-from diagnosis.data_quality.reference_model import ReferenceModel
+from diagnosis.data_quality.output_comparison import OutputComparison, ReferenceModel
 from engine.recordings.recording import Channel, Recording, crop, split_by_windows
 
 GRID_STEP = 0.01
@@ -41,11 +40,10 @@ MAX_SIMULATED_TIME = Fraction(24)
 
 @dataclass(frozen=True)
 class OutputAgreement:
-    """The agreement of a measured output with the simulated one: measured = gain * simulated(t -
-    lag).
+    """The agreement of outputs: measured = gain * simulated(t - lag).
 
-    The gain is the one of fast or of slow motion, whichever is nearer to 1. `level` is the ratio of
-    their root mean squares in the second half.
+    The gain is that of fast or of slow motion, whichever is nearer to 1. `level` is the ratio of
+    root mean squares in the second half.
     """
 
     recording: str
@@ -75,11 +73,10 @@ class OutputAgreement:
 def compare_with_simulation(
     recordings: Sequence[Recording], reference: ReferenceModel
 ) -> list[OutputAgreement]:
-    """Return the agreement of each output with a simulation, for a piece of each recording window.
+    """Return the agreement of each output with a simulation, in the piece of each window.
 
-    Pieces are the most excited ones of `MIN_PIECE` to `MAX_PIECE` (4 to 10 s); once
-    `MAX_SIMULATED_TIME` (24 s) is reached, later windows are left out. Outputs that
-    `compare_signals` cannot compare are left out. Inputs faster than 100 Hz are thinned out.
+    Pieces are the most excited ones of 4 to 10 s, `MAX_SIMULATED_TIME` (24 s) in all. Inputs faster
+    than 100 Hz are thinned out.
     """
     agreements: list[OutputAgreement] = []
     remaining_time = MAX_SIMULATED_TIME
@@ -98,12 +95,7 @@ def compare_with_simulation(
 
 
 def most_excited_piece(piece: Recording, max_length: Fraction) -> Recording:
-    """Return the most excited part of a recording of length `max_length` [s]; all of it if shorter.
-
-    The parts begin at multiples of half of that length. The most excited one has the largest sum,
-    over inputs, of the standard deviation of the changes over that of the values; the first one is
-    taken if several are equal.
-    """
+    """Return the most excited part of a recording of length `max_length` [s]."""
     if piece.end - piece.start <= max_length:
         return piece
     count = int(2 * (piece.end - piece.start) / max_length)
@@ -119,16 +111,13 @@ def _decimate_inputs(piece: Recording) -> Recording:
         span = channel.times[-1] - channel.times[0]
         every = int(len(channel.times) / (span / Fraction(GRID_STEP))) if span else 1
         if channel.column.to is not None and every > 1:
-            channels[name] = Channel(
-                channel.column, channel.times[::every], channel.values[::every]
-            )
+            part = slice(None, None, every)
+            channels[name] = Channel(channel.column, channel.times[part], channel.values[part])
     return dataclasses.replace(piece, channels=channels)
 
 
 def _excitation_level(piece: Recording, start: Fraction, end: Fraction) -> float:
-    """Return the sum over inputs of the spread of
-    their changes relative to that of their values.
-    """
+    """Return the sum over inputs of the spread of changes over that of values."""
     total = 0.0
     for channel in piece.channels.values():
         inside = (channel.seconds >= float(start)) & (channel.seconds <= float(end))
@@ -159,10 +148,8 @@ def compare_signals(
 ) -> OutputAgreement | None:
     """Return the agreement of the rates of change of two signals, smoothed by `spread` [s].
 
-    The lag of largest correlation within `MAX_LAG` (1 s) is taken, or that of the most negative one
-    if its magnitude is larger by `REVERSAL_MARGIN` (0.15); the gain is then negative. The first
-    `TRANSIENT_TIME` (0.8 s) are left out. The result is None if less than 1 s remains, the
-    simulation is not finite, or a rate is constant.
+    The gain is negative if the reversed signal correlates better by `REVERSAL_MARGIN`. The result
+    is None if less than 1 s remains, the simulation is not finite, or a rate is constant.
     """
     if len(comparison.times) < 2:
         return None
@@ -182,9 +169,9 @@ def compare_signals(
     reversed_lag = min(lags, key=lambda lag: correlations[lag])
     if -correlations[reversed_lag] > correlations[best] + REVERSAL_MARGIN:
         best = reversed_lag
-    gains = [
-        _spread_ratio(pair) for pair in (pairs[best], *_low_frequency_rates(comparison, grid, best))
-    ]
+    alike = (pairs[best], *_low_frequency_rates(comparison, grid, best))
+    ratios = [float(np.std(y)) / max(float(np.std(x)), 1e-12) for y, x in alike]
+    gains = [min(max(ratio, 1e-6), 1e6) for ratio in ratios]
     gain = math.copysign(min(gains, key=lambda g: abs(math.log(g))), correlations[best])
     late = comparison.times > 0.5 * (start + end)
     level = _rms(comparison.measured[late]) / max(_rms(comparison.simulated[late]), 1e-12)
@@ -195,23 +182,14 @@ def compare_signals(
 def _low_frequency_rates(
     comparison: OutputComparison, grid: Reals, lag: int
 ) -> list[tuple[Reals, Reals]]:
-    """Return both rates below the resonances at a lag, as a list of one pair; empty if too short.
-
-    A fast sweep has little there but drift.
-    """
+    """Return a list with both rates below the resonances at a lag; empty if too short."""
     shifted = grid + lag * GRID_STEP
     kept = (shifted >= grid[0]) & (shifted <= grid[-1])
     if np.count_nonzero(kept) <= _kernel_size(GAIN_SMOOTHING_STD):
         return []
-    y = _smoothed_rate(comparison.times, comparison.measured, shifted[kept], GAIN_SMOOTHING_STD)
-    return [
-        (y, _smoothed_rate(comparison.times, comparison.simulated, grid[kept], GAIN_SMOOTHING_STD))
-    ]
-
-
-def _spread_ratio(pair: tuple[Reals, Reals]) -> float:
-    """Return the ratio of the standard deviations, limited to 1e-6 to 1e6."""
-    return min(max(float(np.std(pair[0])) / max(float(np.std(pair[1])), 1e-12), 1e-6), 1e6)
+    times, spread = comparison.times, GAIN_SMOOTHING_STD
+    measured = _smoothed_rate(times, comparison.measured, shifted[kept], spread)
+    return [(measured, _smoothed_rate(times, comparison.simulated, grid[kept], spread))]
 
 
 def _rms(values: Reals) -> float:

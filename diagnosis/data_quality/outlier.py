@@ -30,10 +30,7 @@ SECONDS_PER_HOUR = 3600.0
 
 
 def drop_huge_values(recording: Recording) -> Recording:
-    """Return a recording without values beyond `MAX_VALUE` (1e15) or NaN.
-
-    Channels without other values are dropped.
-    """
+    """Return a recording without NaN, values beyond `MAX_VALUE` (1e15) and empty channels."""
     channels = {}
     for name, channel in recording.channels.items():
         known = np.abs(channel.array) <= MAX_VALUE
@@ -49,10 +46,8 @@ def drop_huge_values(recording: Recording) -> Recording:
 def find_outliers(recording: Recording, automaton: Automaton | None) -> list[Finding]:
     """Return an error for each channel with outliers, which names the largest one and its time.
 
-    Outliers are values beyond `MAX_VALUE`; without any, values whose distance from the median of
-    `MEDIAN_SAMPLES` (5) exceeds `RANGE_FACTOR` (3) times the range of these medians and
-    `NOISE_FACTOR` (20) standard deviations of the noise, in a channel of at least 20 values. The
-    range of the compared state is added if the automaton declares one that the value exceeds.
+    Outliers are beyond `MAX_VALUE`; else far from the median-filtered signal. A declared range of
+    the compared state is added if the value exceeds it.
     """
     found = []
     for name, channel in recording.channels.items():
@@ -73,10 +68,7 @@ def find_outliers(recording: Recording, automaton: Automaton | None) -> list[Fin
 
 
 def _is_outlier(values: Reals) -> NDArray[np.bool_]:
-    """Return the mask of values far from the median-filtered signal (samples,).
-
-    No value is an outlier in a short signal, or if the filtered signal is constant.
-    """
+    """Return the mask (samples,) of values far from the median-filtered signal, if it varies."""
     if len(values) < 4 * MEDIAN_SAMPLES:
         return np.zeros(len(values), dtype=np.bool_)
     around = np.pad(values, MEDIAN_SAMPLES // 2, mode="edge")
@@ -100,11 +92,7 @@ def _range_text(channel: Channel, value: float, automaton: Automaton | None, fac
 
 
 def find_long_pauses(recording: Recording) -> list[Finding]:
-    """Return an error for the first long pause of time stamps in each window of a recording.
-
-    The stamps are those of all channels together; a pause is long from `MAX_PAUSE_FRACTION` (half)
-    of the window's duration and `MIN_PAUSE` (2 s) on.
-    """
+    """Return an error for the first pause in all stamps of each window of `shortest_long_pause`."""
     found = []
     for piece in split_by_windows(recording):
         least = shortest_long_pause(float(piece.end - piece.start))

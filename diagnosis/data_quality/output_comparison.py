@@ -5,8 +5,9 @@ from __future__ import annotations
 import dataclasses
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from engine.simulation.simulate import simulate
 from engine.simulation.stimuli import stimulus_of
 from language.expressions.syntax_tree import Name
 from language.ir.program import Program
+from language.loading.load import program_of
 from language.loading.system_reader import single_instance_system
 from language.model.automaton import Automaton
 from language.model.declaration import Formula, Input
@@ -26,36 +28,22 @@ from language.text.diagnostic import Problem, SpecError
 
 INITIAL_INPUT_NAME = "recorded_start_of_{}"
 """Name of the input that gives the initial value of a state."""
-MIN_STD = 1e-12
-"""Smallest standard deviation [SI] by which an error is divided; a constant output has 0."""
 
 
 @dataclass(frozen=True)
 class OutputComparison:
     """A recorded output and the simulated one at its time stamps [s], in SI, (samples,) each."""
 
-    output: str
     times: Reals
     measured: Reals
     simulated: Reals
 
-    @property
-    def rms(self) -> float:
-        """The root mean square of measured minus simulated values."""
-        return float(np.sqrt(np.mean((self.measured - self.simulated) ** 2)))
-
-    @property
-    def nrmse(self) -> float:
-        """`rms` over the standard deviation of the measured values, which is at least MIN_STD."""
-        return self.rms / max(float(np.std(self.measured)), MIN_STD)
-
 
 @dataclass(frozen=True)
 class FreeRun:
-    """A simulation from the time `start` [s] of a recording, and its comparison by column name."""
+    """A simulation under the inputs of a recording, and its comparison by column name."""
 
     trajectory: Trajectory
-    start: Fraction
     comparisons: Mapping[str, OutputComparison]
 
 
@@ -83,12 +71,9 @@ def simulate_free_run(
 ) -> FreeRun:
     """Return a simulation under recorded inputs from the first measured states, without feedback.
 
-    It begins when every recorded input has a value, and ends with the last channel. An input
-    without a channel has the constant of the map, else its default, else 0. A state that is a
-    compared output begins at its latest measured value. Outputs are interpolated linearly between
-    rows, one major step apart, at the time stamps of the measurements. `programs` is a cache for
-    other recordings of the same automaton and is extended. Raises SpecError if the recording ends
-    before every input has a value.
+    It begins when every recorded input has a value. An input without a channel has the constant of
+    the map, else its default, else 0. `programs` is a cache for other recordings of the same
+    automaton. Raises SpecError if the recording ends before every input has a value.
     """
     input_channels = [c for c in recording.channels.values() if c.column.to in automaton.inputs]
     outputs = [c for c in recording.channels.values() if c.column.compare in automaton.outputs]
@@ -97,16 +82,14 @@ def simulate_free_run(
     if end <= start:
         label = f"recording `{recording.name}` ends before every input has a value"
         raise SpecError([Problem("range", recording.place or mapping.span, label)])
-    initial_values = {
-        source: _value_at(channel, start)
+    initial_values = {  # the latest value at the start, else the first one
+        source: Fraction(channel.values[max(0, bisect_right(channel.times, start) - 1)])
         for channel in outputs
         if (source := automaton.output_source(channel.column.compare or "")) in automaton.states
     }
     initial_inputs = {
-        INITIAL_INPUT_NAME.format(name): Stimulus(
-            (StimulusPiece(Fraction(0), initial_values[name]),)
-        )
-        for name in initial_values
+        INITIAL_INPUT_NAME.format(name): Stimulus((StimulusPiece(Fraction(0), value),))
+        for name, value in initial_values.items()
     }
     scenario = Scenario(
         name=recording.name,
@@ -117,30 +100,18 @@ def simulate_free_run(
         every=automaton.step,
         span=mapping.span,
     )
-    trajectory = _simulate(
-        _with_initial_state_inputs(automaton, initial_values), scenario, run_program, programs
-    )
+    system = single_instance_system(_with_initial_state_inputs(automaton, initial_values))
+    varying = [name for name, stimulus in scenario.inputs.items() if stimulus.varies]
+    kind = (tuple(scenario.inputs), tuple(varying))
+    programs = {} if programs is None else programs
+    if kind not in programs:
+        programs[kind] = programs_of(system, scenario)
+    trajectory = run_program(system, scenario, programs[kind])
     compared = {
         channel.column.name: _compare_output(automaton, channel, trajectory, start)
         for channel in outputs
     }
-    return FreeRun(trajectory, start, compared)
-
-
-def _simulate(
-    automaton: Automaton,
-    scenario: Scenario,
-    run_program: RunFunction,
-    programs: ProgramCache | None,
-) -> Trajectory:
-    """Return the trajectory of an automaton, with Programs from the cache where possible."""
-    system = single_instance_system(automaton)
-    varying = [name for name, stimulus in scenario.inputs.items() if stimulus.varies]
-    kind = (tuple(automaton.inputs), tuple(varying))
-    programs = {} if programs is None else programs
-    if kind not in programs:
-        programs[kind] = programs_of(system, scenario)
-    return run_program(system, scenario, programs[kind])
+    return FreeRun(trajectory, compared)
 
 
 def _with_initial_state_inputs(automaton: Automaton, names: Collection[str]) -> Automaton:
@@ -171,11 +142,6 @@ def _recorded_inputs(
     return found
 
 
-def _value_at(channel: Channel, start: Fraction) -> Fraction:
-    """Return the latest value of a channel at a time, or its first value."""
-    return Fraction(channel.values[max(0, bisect_right(channel.times, start) - 1)])
-
-
 def _compare_output(
     automaton: Automaton, channel: Channel, trajectory: Trajectory, start: Fraction
 ) -> OutputComparison:
@@ -186,8 +152,57 @@ def _compare_output(
     until = int(np.searchsorted(times, trajectory.times[-1], side="right"))
     signal = trajectory.signals[f"{automaton.name}.{output}"]
     return OutputComparison(
-        output,
         times[:until] + float(start),
         np.array(channel.values[first : first + until]),
         np.interp(times[:until], trajectory.times, signal),
     )
+
+
+MAX_STEP, STABILITY_MARGIN = 0.004, 3.0
+"""Longest major step [s], and the margin to the largest stable step."""
+
+
+@dataclass(frozen=True)
+class ReferenceModel:
+    """An automaton with its recording map; `run_programs` executes its Programs."""
+
+    automaton: Automaton
+    mapping: RecordingMap
+    run_programs: RunFunction = run_interpreter
+    _programs: ProgramCache = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def coarse_automaton(self) -> Automaton:
+        """The automaton with the longest stable step that resolves motion of 4 Hz.
+
+        The step of an automaton without stability limits is unchanged.
+        """
+        motion = program_of(self.automaton).integration
+        limits = [limit.step for limit in motion.stability_limits] if motion else []
+        if not limits:
+            return self.automaton
+        most = min(MAX_STEP, min(limits) / STABILITY_MARGIN)
+        step = max(self.automaton.step, Fraction(round(most * 1e6), 10**6))
+        return dataclasses.replace(self.automaton, step=step)
+
+    def simulate(self, recording: Recording) -> FreeRun:
+        """Return a free run of the coarse automaton; SpecError as in `simulate_free_run`."""
+        return simulate_free_run(
+            self.coarse_automaton, recording, self.mapping, self.run_programs, self._programs
+        )
+
+
+_cache: list[ReferenceModel] = []
+
+
+def cached_reference(
+    automaton: Automaton, mapping: RecordingMap, run_programs: RunFunction
+) -> ReferenceModel:
+    """Return the reference model; the latest one is reused for identical arguments."""
+    if _cache:
+        latest = _cache[0]
+        same = latest.automaton is automaton and latest.mapping is mapping
+        if same and latest.run_programs is run_programs:
+            return latest
+    _cache[:] = [ReferenceModel(automaton, mapping, run_programs)]
+    return _cache[0]

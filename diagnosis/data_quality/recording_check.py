@@ -12,9 +12,8 @@ from diagnosis.data_quality.excitation import Excitation, analyse_excitation
 from diagnosis.data_quality.finding import Finding, sort_by_severity
 from diagnosis.data_quality.model_agreement import OutputAgreement, compare_with_simulation
 from diagnosis.data_quality.outlier import drop_huge_values, find_long_pauses, find_outliers
-from diagnosis.data_quality.output_comparison import RunFunction, run_interpreter
+from diagnosis.data_quality.output_comparison import RunFunction, cached_reference, run_interpreter
 from diagnosis.data_quality.redundant_speeds import find_redundant_speeds
-from diagnosis.data_quality.reference_model import cached_reference
 from diagnosis.data_quality.unit_correction import (
     find_corrections,
     find_millisecond_time,
@@ -37,10 +36,7 @@ MIN_SAMPLES = 100
 
 @dataclass(frozen=True)
 class RecordingCheck:
-    """Properties of each channel, findings (errors first) and the excitation.
-
-    `agreements` relate recorded outputs to simulated ones; there are none without an automaton.
-    """
+    """The channels, findings (errors first), excitation and agreement with a simulation."""
 
     channels: tuple[ChannelCheck, ...]
     findings: tuple[Finding, ...]
@@ -63,22 +59,15 @@ def check_recordings(
 ) -> RecordingCheck:
     """Return the checks of recordings; with an automaton also of units, signs and clocks.
 
-    Values beyond `MAX_VALUE` are reported and then dropped. Recordings with a finding of
-    `DISQUALIFYING_KINDS` are not compared with the model; without an automaton their speeds are
-    compared with each other instead. `find_clock_errors` searches wrong clocks and signs by
-    prediction, or returns None if it cannot; the clock findings of the simulation are then
-    warnings. `file_findings` are those on the files as such. Sampled automata are not simulated.
+    `find_clock_errors` searches wrong clocks and signs by prediction, or returns None if it cannot;
+    the clock findings of the simulation are then warnings. Sampled automata are not simulated.
     Raises SpecError if the simulation of a recording fails.
     """
     mismatches = {one.name: find_clock_mismatches(one) for one in recordings}
-    early_findings = [
-        f
-        for one in recordings
-        for f in (
-            *find_outliers(one, automaton),
-            *(mismatches[one.name] or find_long_pauses(one)),
-        )
-    ]
+    early_findings: list[Finding] = []
+    for one in recordings:
+        early_findings += find_outliers(one, automaton)
+        early_findings += mismatches[one.name] or find_long_pauses(one)
     recordings = [drop_huge_values(recording) for recording in recordings]
     channels, findings = _check_channels(recordings, early_findings)
     excited = analyse_excitation(recordings, channels)
@@ -92,42 +81,27 @@ def check_recordings(
     reference = None
     if automaton is not None and automaton.period is None:
         reference = cached_reference(automaton, mapping, run_programs)
-        findings += [
-            f
-            for one in recordings
-            if not mismatches[one.name]
-            for f in find_millisecond_time(one, reference)
-        ]
+        for one in recordings:
+            findings += [] if mismatches[one.name] else find_millisecond_time(one, reference)
     broken = {finding.recording for finding in findings if finding.kind in DISQUALIFYING_KINDS}
-    usable_recordings = [one for one in recordings if "" not in broken and one.name not in broken]
+    usable = [one for one in recordings if "" not in broken and one.name not in broken]
     agreements: list[OutputAgreement] = []
-    if automaton is None and usable_recordings:
-        findings += find_redundant_speeds(usable_recordings)
-    if reference is not None and usable_recordings:
-        agreements = compare_with_simulation(usable_recordings, reference)
-        inconsistencies = find_unit_sign_clock_errors(
-            agreements, reference.automaton, mapping, usable_recordings
-        )
-        inconsistencies = replace_corrected(
-            inconsistencies,
-            find_corrections(agreements, usable_recordings, reference, inconsistencies),
-        )
-        inconsistencies = [
-            finding
-            for finding in inconsistencies
-            if not agrees_with_other_outputs(finding, agreements)
-        ]
-        findings += _merge_clock_errors(inconsistencies, usable_recordings, find_clock_errors)
+    if automaton is None and usable:
+        findings += find_redundant_speeds(usable)
+    if reference is not None and usable:
+        agreements = compare_with_simulation(usable, reference)
+        errors = find_unit_sign_clock_errors(agreements, reference.automaton, mapping, usable)
+        corrections = find_corrections(agreements, usable, reference, errors)
+        errors = replace_corrected(errors, corrections)
+        errors = [one for one in errors if not agrees_with_other_outputs(one, agreements)]
+        findings += _merge_clock_errors(errors, usable, find_clock_errors)
     return RecordingCheck(tuple(channels), sort_by_severity(findings), excited, tuple(agreements))
 
 
 def _check_channels(
     recordings: Sequence[Recording], earlier: Sequence[Finding]
 ) -> tuple[list[ChannelCheck], list[Finding]]:
-    """Return the properties of each channel, and the earlier findings with those on channels.
-
-    In recordings whose time leaps, gaps and dropped samples are not reported.
-    """
+    """Return the checks, and all findings without gaps in recordings whose time leaps."""
     leapt = {finding.recording for finding in earlier if finding.kind == "leap"}
     channels, findings = [], list(earlier)
     for recording in recordings:
@@ -145,11 +119,10 @@ def _merge_clock_errors(
     recordings: Sequence[Recording],
     find_clock_errors: ClockErrorSearch,
 ) -> list[Finding]:
-    """Return findings with those on clocks and signs replaced by `find_clock_errors` where
-    possible.
+    """Return findings with those on clocks and signs replaced by `find_clock_errors`.
 
-    A sign error of an input needs a sign finding of the simulation in that recording too. If the
-    search is impossible, clock findings become warnings.
+    A sign error of an input needs a sign finding of the simulation too. If the search is
+    impossible, clock findings become warnings.
     """
     others = [finding for finding in findings if finding.kind not in ("clock_offset", "sign")]
     wrong = {finding.recording for finding in others if finding.severity == "error"}
@@ -162,11 +135,7 @@ def _merge_clock_errors(
     shared = [finding for finding in signs if not finding.recording]
     against = {finding.recording for finding in signs}
     fed = {c.column.name for one in recordings for c in one.channels.values() if c.column.to}
-    sure = [
-        finding
-        for finding in sure
-        if finding.kind != "sign" or finding.channel not in fed or finding.recording in against
-    ]
+    sure = [f for f in sure if f.kind != "sign" or f.channel not in fed or f.recording in against]
     known = any(finding.kind == "sign" and not finding.recording for finding in sure)
     return [*others, *(sure if known or not shared else shared)]
 
@@ -177,7 +146,7 @@ def _find_missing_signals(
     mapping: RecordingMap,
     automaton: Automaton | None,
 ) -> list[Finding]:
-    """Return errors for channels that a recording lacks and for inputs that must not be constant.
+    """Return errors for missing channels and for inputs that must not be constant.
 
     An input without a default that is constant everywhere drives nothing. One that is noisy in most
     recordings cannot be constant in another one.
@@ -185,10 +154,9 @@ def _find_missing_signals(
     names = dict.fromkeys(name for recording in recordings for name in recording.channels)
     if automaton is not None:
         names |= dict.fromkeys(used_columns(mapping, automaton))
+    text = "is not recorded: the signal is missing"
     found = [
-        Finding(
-            "no_signal", recording.name, name, "is not recorded: the signal is missing", "error"
-        )
+        Finding("no_signal", recording.name, name, text, "error")
         for recording in recordings
         for name in names
         if name not in recording.channels
@@ -211,10 +179,7 @@ def _find_missing_signals(
 
 
 def used_columns(mapping: RecordingMap, automaton: Automaton | None) -> list[str]:
-    """Return the columns of a map that an automaton reads or compares, in the order of the map.
-
-    All columns are returned without an automaton, and if it uses none.
-    """
+    """Return the columns that an automaton reads or compares; all if there are none."""
     if automaton is None:
         return list(mapping.columns)
     return [
@@ -229,16 +194,14 @@ def _find_insufficient_data(
 ) -> list[Finding]:
     """Return errors for recordings that are too short, and for missing excitation."""
     found = []
-    fewest = min((check.samples for check in checks), default=0)
-    name = recordings[0].name if len(recordings) == 1 else ""
-    if fewest < MIN_SAMPLES and len(recordings) == 1:
-        text = f"{fewest} samples of a channel are too few to tell effects apart"
-        found.append(Finding("too_short", name, "", text, "error"))
-    for recording in recordings if len(recordings) > 1 else ():
+    is_single = len(recordings) == 1
+    purpose = "to tell effects apart" if is_single else "to be used"
+    for recording in recordings:
         fewest = min((c.samples for c in checks if c.recording == recording.name), default=0)
         if fewest < MIN_SAMPLES:
-            text = f"{fewest} samples of a channel are too few to be used"
+            text = f"{fewest} samples of a channel are too few {purpose}"
             found.append(Finding("too_short", recording.name, "", text, "error"))
+    name = recordings[0].name if is_single else ""
     if excitation.is_absent:
         names = ", ".join(f"`{signal.name}`" for signal in excitation.inputs) or "no input"
         text = f"nothing is excited: {names} neither steps nor varies above its noise"

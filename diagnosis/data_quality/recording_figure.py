@@ -10,9 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 
 from diagnosis.data.array_types import Reals
-from diagnosis.data.spectrum import spectrum
 from diagnosis.data_quality.channel import ChannelCheck
-from diagnosis.data_quality.excitation import Excitation, SignalExcitation
+from diagnosis.data_quality.excitation import Excitation, SignalExcitation, spectrum
 from diagnosis.data_quality.finding import format_findings
 from diagnosis.data_quality.recording_check import RecordingCheck
 from engine.recordings.recording import Channel, Recording
@@ -35,12 +34,7 @@ COLOURS = {"error": "#cc3344", "warning": "#b58900", "note": GREY}
 
 
 def draw_recordings(recordings: Sequence[Recording], check: RecordingCheck, title: str) -> Picture:
-    """Return the picture of checked recordings, with the findings.
-
-    On the left are the first `MAX_CHANNELS` (6) channels over time, recordings in a row, with
-    windows, gaps and stuck intervals shaded; on the right the main input over the main speed, its
-    spectrum and the testable effects; below the first `MAX_FINDINGS` (5) lines of findings.
-    """
+    """Return the picture of checked recordings: channels, operating range, effects, findings."""
     names = list(dict.fromkeys(one.name for one in check.channels))[:MAX_CHANNELS]
     count = max(1, len(format_findings(check.findings)[:MAX_FINDINGS]))
     height = 1.6 + 1.25 * max(len(names), 5) + 0.24 * count
@@ -74,19 +68,18 @@ def _draw_channels(
         shift = float(recordings[0].start) if len(recordings) == 1 else 0.0
         for recording in recordings:
             channel = recording.channels.get(name)
-            start = float(recording.start)
+            move = shift - float(recording.start)
             if channel is not None:
-                _draw_signal(axis, channel, shift - start)
+                _draw_signal(axis, channel, move)
                 for one in check.channels:
                     if (one.recording, one.name) == (recording.name, name):
-                        _mark_defects(axis, one, shift - start)
+                        _mark_defects(axis, one, move)
             for first, last in recording.windows:
-                axis.axvspan(
-                    float(first) + shift - start, float(last) + shift - start,
-                    color=GREEN, alpha=0.07, lw=0,
-                )  # fmt: skip
+                _shade(axis, (float(first), float(last)), move, GREEN, 0.07)
             if row == 0 and len(recordings) > 1:
-                _draw_name(axis, recording.name, shift)
+                across, text = axis.get_xaxis_transform(), escape_invisible(f" {recording.name}")
+                axis.text(shift, 1.0, text, fontsize=7.5, color=GREY, va="top", transform=across,
+                          parse_math=False)  # fmt: skip
             shift += float(recording.end - recording.start)
             axis.axvline(shift, color=GREY, lw=0.8, ls=":")
         one = next(one for one in check.channels if one.name == name)
@@ -94,27 +87,14 @@ def _draw_channels(
         axis.tick_params(labelsize=7.5, labelbottom=row == len(names) - 1)
         axis.spines[["top", "right"]].set_visible(False)
         axis.margins(x=0.0)
-    axes[-1].set_xlabel(
-        "time [s]" if len(recordings) == 1 else "recordings in a row, time [s]", fontsize=8
-    )
-
-
-def _draw_name(axis: Axes, name: str, start: float) -> None:
-    """Write the name of a recording at its start."""
-    across = axis.get_xaxis_transform()
-    text = escape_invisible(f" {name}")
-    axis.text(start, 1.0, text, fontsize=7.5, color=GREY, va="top", transform=across,
-              parse_math=False)  # fmt: skip
+    label = "time [s]" if len(recordings) == 1 else "recordings in a row, time [s]"
+    axes[-1].set_xlabel(label, fontsize=8)
 
 
 def _format_facts(check: ChannelCheck) -> str:
     """Return the title of a channel: name, unit, rate, quantisation, noise and missing samples."""
-    parts = [
-        f"{check.name}"
-        + (f" \N{RIGHTWARDS ARROW} {check.signal}" if check.signal != check.name else "")
-    ]
-    parts[0] += f"  [{check.unit}]"
-    parts.append(f"{check.rate:.4g} Hz")
+    signal = f" \N{RIGHTWARDS ARROW} {check.signal}" if check.signal != check.name else ""
+    parts = [f"{check.name}{signal}  [{check.unit}]", f"{check.rate:.4g} Hz"]
     if check.quantum:
         parts.append(f"step {check.quantum / check.factor:.3g}")
     parts.append(f"noise {check.noise / check.factor:.2g}")
@@ -126,17 +106,24 @@ def _format_facts(check: ChannelCheck) -> str:
 def _draw_signal(axis: Axes, channel: Channel, shift: float) -> None:
     """Draw one channel in the unit of its file, shifted in time."""
     times, values = _envelope(channel.seconds + shift, channel.array)
-    factor = float(channel.column.unit.factor * channel.column.scale[0])
     colour = "#cc7a00" if channel.column.to is not None else BLUE
-    axis.plot(times, values / factor, color=colour, lw=0.8)
+    axis.plot(times, values / _si_factor(channel), color=colour, lw=0.8)
 
 
 def _mark_defects(axis: Axes, check: ChannelCheck, shift: float) -> None:
     """Shade the gaps and the stuck interval of a channel."""
-    for start, end in check.gaps:
-        axis.axvspan(start + shift, end + shift, color=RED, alpha=0.25, lw=0)
+    for gap in check.gaps:
+        _shade(axis, gap, shift, RED, 0.25)
     if check.stuck:
-        axis.axvspan(check.stuck[0] + shift, check.stuck[1] + shift, color=YELLOW, alpha=0.35, lw=0)
+        _shade(axis, check.stuck, shift, YELLOW, 0.35)
+
+
+def _shade(
+    axis: Axes, interval: tuple[float, float], shift: float, colour: str, alpha: float
+) -> None:
+    """Shade an interval [s], shifted in time."""
+    start, end = interval
+    axis.axvspan(start + shift, end + shift, color=colour, alpha=alpha, lw=0)
 
 
 def _envelope(times: Reals, values: Reals) -> tuple[Reals, Reals]:
@@ -165,7 +152,7 @@ def _draw_operating_range(
     pairs = [
         (r.channels[first.name], r.channels[second.name])
         for r in recordings
-        if first and second and first.name in r.channels and second.name in r.channels
+        if first and second and {first.name, second.name} <= r.channels.keys()
     ]
     if not pairs or first is second:
         _draw_empty(axis, "no input beside a speed")
@@ -214,9 +201,8 @@ def _draw_spectrum(axis: Axes, recordings: Sequence[Recording], check: Recording
 def _draw_effects(axis: Axes, excitation: Excitation) -> None:
     """List the effects: testable ones in green, the others pale."""
     able = sum(effect.is_testable for effect in excitation.effects)
-    axis.set_title(
-        f"these data can test {able} of {len(excitation.effects)} effects", loc="left", fontsize=9.5
-    )
+    title = f"these data can test {able} of {len(excitation.effects)} effects"
+    axis.set_title(title, loc="left", fontsize=9.5)
     axis.axis("off")
     rows = -(-len(excitation.effects) // 2)
     ordered = sorted(excitation.effects, key=lambda effect: (not effect.is_testable, effect.effect))

@@ -1,5 +1,4 @@
-"""Recording map inference: what files without a recording map have, from names and units of
-columns."""
+"""Recording map inference: the map of files without one, from names and units of columns."""
 
 from __future__ import annotations
 
@@ -52,18 +51,13 @@ MAX_SHOWN = 20
 def guess_map(
     names: Mapping[Path, str], databases: Sequence[str] = ()
 ) -> tuple[RecordingMap, tuple[Finding, ...]]:
-    """Return a map of the first `MAX_COLUMNS` (12) numeric columns of all files together, and
-    findings on the columns left out.
+    """Return a map of the first `MAX_COLUMNS` (12) numeric columns, and findings on the others.
 
-    `names` are the display names of the files for findings.
-    The columns of a file follow those of the files before it. The time is the first column of the
-    first file that is named like a time (`t`, `time_ms`), else its first strictly increasing one.
-    The unit is that of the first file with the column, else that of the suffix of the name
-    (`UNIT_SUFFIXES`), else none; columns in units of force or torque are inputs, all others
-    outputs. Names that a file has twice are left out. `databases` are the CAN databases of the
-    command line. Raises SpecError if the first file has no time column, for a file that cannot be
-    opened, and if no file has a numeric column; MissingToolError if the format needs a package that
-    is not installed.
+    `names` are the display names of files, `databases` the CAN databases of the command line. The
+    time is a column of the first file with such a name, else one that increases. Units are those of
+    the file, else of the suffix; columns in `INPUT_UNITS` are inputs. Raises SpecError without a
+    time or a numeric column and for a file that cannot be opened; MissingToolError for a missing
+    package.
     """
     paths = list(names)
     place = Span(Source(display_path(paths[0])), 1, 1)
@@ -98,10 +92,7 @@ def guess_map(
 def _left_out_findings(file: RecordedFile, mapping: RecordingMap, name: str) -> list[Finding]:
     """Return a finding on each column of a file that a guessed map leaves out, and on its clocks.
 
-    A column that is there twice or has no finite value is an error (a note in a file with time
-    stamps), other texts are a warning; columns after the first `MAX_COLUMNS` and time columns of
-    single channels are notes. Such a time column that shares hardly any time with that of the map
-    is an error. The second name of a signal is not reported.
+    The second name of a signal is not reported.
     """
     if not file.rows:
         return []
@@ -168,31 +159,22 @@ def _clock_findings(
 
 
 def _numeric_columns(file: RecordedFile, time: str) -> Iterator[str]:
-    """Yield the columns of numbers of a file except those of time, in the order of the file.
-
-    Names that the file has twice are left out.
-    """
+    """Yield the unique columns of numbers of a file except those of time, in its order."""
     names = _distinct_names(file, time)
     yield from (n for n in names if list(file.names).count(n) == 1 and _is_number(file, n))
 
 
 def _distinct_names(file: RecordedFile, time: str) -> list[str]:
-    """Return the names of a file except those of time, each once.
-
-    Of two names of one signal in a file with time stamps the shorter one is kept.
-    """
-    names = [
-        n for n in dict.fromkeys(file.names) if n != time and not CHANNEL_TIME_NAME.fullmatch(n)
-    ]
+    """Return each name except those of time; the shorter one of two names of a signal."""
+    distinct = dict.fromkeys(file.names)
+    names = [n for n in distinct if n != time and not CHANNEL_TIME_NAME.fullmatch(n)]
     if file.is_stamped:
         names = [n for n in names if n.rpartition(".")[2] == n or n.rpartition(".")[2] not in names]
     return names
 
 
 def _find_time_column(file: RecordedFile, problems: Problems) -> str:
-    """Return the first column with a name of time, else the first increasing one;
-    "" with a problem.
-    """
+    """Return the first column named like time, else the first increasing one, else none ("")."""
     named = [name for name in file.names if TIME_NAME.fullmatch(name)]
     for name in (*named, *file.names):
         if list(file.names).count(name) != 1:
@@ -206,19 +188,15 @@ def _find_time_column(file: RecordedFile, problems: Problems) -> str:
 
 
 def _is_number(file: RecordedFile, name: str) -> bool:
-    """Return whether more than 20 % of the cells of a
-    column are finite numbers and few are not finite.
-    """
+    """Return whether over 20 % of the cells are finite and few are not finite."""
     values = file.read(name).values
-    number = sum(value is not None and math.isfinite(value) for value in values)
-    bad = sum(value is not None and not math.isfinite(value) for value in values)
+    is_finite = [math.isfinite(value) for value in values if value is not None]
+    number, bad = is_finite.count(True), is_finite.count(False)
     return number > MIN_NUMBER_FRACTION * len(values) and bad <= number // 10
 
 
 def _guess_column(name: str, written: str, span: Span) -> ColumnMapping:
-    """Return the mapping of a column: an input if its unit is one of `INPUT_UNITS`,
-    else an output.
-    """
+    """Return the mapping of a column: an input for `INPUT_UNITS`, else an output."""
     unit = _guess_unit(name, written)
     drives = any(are_compatible(unit.dimension, parse_unit(text).dimension) for text in INPUT_UNITS)
     return ColumnMapping(

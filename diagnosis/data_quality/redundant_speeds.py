@@ -32,10 +32,8 @@ MAX_OFFSET = 0.6
 def find_redundant_speeds(recordings: Sequence[Recording]) -> list[Finding]:
     """Return findings on pairs of speeds that agree except for a sign or a clock offset.
 
-    Speeds agree from a correlation of `MIN_CORRELATION` (0.9) on, in the longest window of a
-    recording. A finding (`sign` or `clock_offset`, from `OFFSET_WARNING` to `MAX_OFFSET`) needs
-    more than `SHARED_FRACTION` (0.6) of the recordings in which the pair agrees; it is a warning if
-    that is a single one, else an error.
+    Speeds agree from `MIN_CORRELATION` on, in the longest window of a recording. A finding needs
+    `SHARED_FRACTION` of these recordings; it is a warning if there is one only.
     """
     found: dict[tuple[str, str], list[OutputAgreement]] = {}
     for recording in recordings:
@@ -59,14 +57,12 @@ def _compare_speeds(
     other = piece.channels.get(second.column.name)
     if one is None or other is None:
         return None
-    start = max(one.seconds[0], other.seconds[0])
-    end = min(one.seconds[-1], other.seconds[-1])
-    inside = (other.seconds >= start) & (other.seconds <= end)
+    inside = (other.seconds >= one.seconds[0]) & (other.seconds <= one.seconds[-1])
     if inside.sum() < 2:
         return None
     times = other.seconds[inside]
     same = np.interp(times, one.seconds, one.array)
-    compared = OutputComparison(other.column.name, times, other.array[inside], same)
+    compared = OutputComparison(times, other.array[inside], same)
     return compare_signals(recording.name, other.column.name, compared, GAIN_SMOOTHING_STD)
 
 

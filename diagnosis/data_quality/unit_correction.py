@@ -1,7 +1,4 @@
-"""Unit correction: another unit of a column, or two exchanged columns, that explain a mismatch.
-
-Each correction is tested by a simulation under the corrected recording.
-"""
+"""Unit correction: another unit of a column, or exchanged columns, tested by a simulation."""
 
 from __future__ import annotations
 
@@ -20,7 +17,7 @@ from diagnosis.data_quality.model_agreement import (
     compare_with_simulation,
     most_excited_piece,
 )
-from diagnosis.data_quality.reference_model import ReferenceModel
+from diagnosis.data_quality.output_comparison import ReferenceModel
 from diagnosis.data_quality.unit_sign_clock_errors import SHARED_FRACTION, UNIT_FACTORS
 from engine.recordings.recording import Channel, Recording, split_by_windows
 from language.expressions.units import are_compatible, parse_unit
@@ -62,11 +59,7 @@ class ColumnCorrection:
     reason: str = ""
 
     def apply(self, recording: Recording) -> Recording:
-        """Return a recording with the correction applied; `recording` is not changed.
-
-        The times and values of both columns are exchanged, or the values divided by `factor`.
-        KeyError without the column.
-        """
+        """Return a recording with the correction applied; KeyError without the column."""
         channels = dict(recording.channels)
         one = channels[self.column]
         if self.other:
@@ -79,10 +72,7 @@ class ColumnCorrection:
         return dataclasses.replace(recording, channels=channels)
 
     def to_finding(self, recording: str) -> Finding:
-        """Return the error on a recording, or on all of them for the name "".
-
-        Its kind is `swap` for an exchange, else `unit`, with the reason as a question.
-        """
+        """Return the error `swap` or `unit` on a recording, or on all of them for an empty name."""
         if self.other:
             text = f"`{self.column}` and `{self.other}` are exchanged: they go with the model "
             return Finding("swap", recording, self.column, text + "the other way round", "error")
@@ -99,47 +89,35 @@ def find_corrections(
 ) -> list[Finding]:
     """Return findings on corrections of recordings that do not agree with the model.
 
-    An output disagrees if |log gain| + 1 - |correlation| exceeds `MIN_DISTANCE` (0.7). At most
-    `MAX_TESTED_RECORDINGS` (3), those of largest distance, are simulated with each possible factor
-    or exchange of columns; a correction must make all outputs agree, and the nearest one is taken.
-    A recording with a unit error in `findings` is skipped if all its outputs correlate by more than
-    `SURE_CORRELATION`. If all recordings that were corrected (at least two) have the same
-    correction, and `SHARED_FRACTION` of all disagree, it is reported once for all.
+    The `MAX_TESTED_RECORDINGS` (3) of largest distance are simulated with each possible correction;
+    the nearest one that makes all outputs agree is taken. A unit error in `findings` is kept if all
+    outputs correlate by `SURE_CORRELATION`. A correction that all have is reported once.
     """
     by_name = {one.name: [r for r in agreements if r.recording == one.name] for one in recordings}
-    sure = {
-        name
-        for f in findings
-        if f.kind == "unit"
-        for name in ([f.recording] if f.recording else by_name)
-    }
-    inconsistent = [
-        one
-        for one in recordings
-        if any(_is_inconsistent(r) for r in by_name[one.name])
+    by_name = {
+        name: each
+        for name, each in by_name.items()
+        if any(_is_inconsistent(r) for r in each)
         and not (
-            one.name in sure
-            and all(abs(r.correlation) > SURE_CORRELATION for r in by_name[one.name])
+            any(f.kind == "unit" and f.recording in ("", name) for f in findings)
+            and all(abs(r.correlation) > SURE_CORRELATION for r in each)
         )
-    ]
-    inconsistent = sorted(
-        inconsistent, key=lambda one: -max(_distance(r) for r in by_name[one.name])
-    )
+    }
+    distances = {name: max(_distance(r) for r in each) for name, each in by_name.items()}
+    inconsistent = [one for one in recordings if one.name in distances]
+    inconsistent.sort(key=lambda one: -distances[one.name])
     corrections: dict[str, ColumnCorrection] = {}
     for recording in inconsistent[:MAX_TESTED_RECORDINGS]:
         part = most_excited_piece(split_by_windows(recording)[0], MIN_PIECE)
-        most = max(_distance(r) for r in by_name[recording.name]) - MIN_DISTANCE
+        most = distances[recording.name] - MIN_DISTANCE
         best = _best_correction(part, list(dict.fromkeys(corrections.values())), most, reference)
         possible = _candidate_corrections(recording, reference.automaton, by_name[recording.name])
         best = best or _best_correction(part, possible, most, reference)
         if best is not None:
             corrections[recording.name] = best
     distinct = set(corrections.values())
-    if (
-        len(distinct) == 1
-        and len(inconsistent) >= max(2.0, SHARED_FRACTION * len(recordings))
-        and len(corrections) > 1
-    ):
+    least = max(2.0, SHARED_FRACTION * len(recordings))
+    if len(distinct) == 1 and len(corrections) > 1 and len(inconsistent) >= least:
         return [distinct.pop().to_finding("")]
     return [correction.to_finding(name) for name, correction in corrections.items()]
 
@@ -147,24 +125,15 @@ def find_corrections(
 def find_millisecond_time(recording: Recording, reference: ReferenceModel) -> list[Finding]:
     """Return a finding if the time of a recording may be in milliseconds, else an empty list.
 
-    It may be if the shortest median period of a channel is at least `MAX_SAMPLE_TIME` (0.5 s) and
-    `MAX_SAMPLE_STEPS` (200) steps of the model. The finding is an error if all outputs agree with
-    the model after a division of the time by 1000, else a warning.
+    It is an error if all outputs agree after a division by 1000, else a warning.
     """
-    usual = min(
-        (
-            float(np.median(np.diff(one.seconds)))
-            for one in recording.channels.values()
-            if len(one.times) > 1
-        ),
-        default=0.0,
-    )
+    channels = [one for one in recording.channels.values() if len(one.times) > 1]
+    usual = min((float(np.median(np.diff(one.seconds))) for one in channels), default=0.0)
     steps = usual / float(reference.automaton.step)
     if usual < MAX_SAMPLE_TIME or steps < MAX_SAMPLE_STEPS:
         return []
-    text = (
-        f"a sample each {usual:.4g} s is one in {steps:.4g} steps of `{reference.automaton.name}`"
-    )
+    name = reference.automaton.name
+    text = f"a sample each {usual:.4g} s is one in {steps:.4g} steps of `{name}`"
     try:
         part = most_excited_piece(split_by_windows(_scale_time(recording))[0], MIN_PIECE)
         after = compare_with_simulation([part], reference)
@@ -190,11 +159,7 @@ def _best_correction(
     max_distance: float,
     reference: ReferenceModel,
 ) -> ColumnCorrection | None:
-    """Return the correction after which all outputs agree with the model, the one at least
-    distance.
-
-    The distance must be below `max_distance`; the result is None if there is no such correction.
-    """
+    """Return the nearest correction within `max_distance` that makes all outputs agree, if any."""
     distances = {}
     for correction in corrections:
         try:
@@ -210,10 +175,7 @@ def _best_correction(
 def _candidate_corrections(
     recording: Recording, automaton: Automaton, agreements: Sequence[OutputAgreement]
 ) -> list[ColumnCorrection]:
-    """Return the corrections that are possible for the used columns, by their dimensions.
-
-    A factor that leaves a gain of an output above `MAX_GAIN` is left out.
-    """
+    """Return the corrections that fit the dimensions and leave gains below `MAX_GAIN`."""
     gains = {agreement.channel: agreement.gain for agreement in agreements}
     used = {
         name: channel.column
@@ -262,16 +224,11 @@ def _distance(agreement: OutputAgreement) -> float:
 def replace_corrected(findings: Sequence[Finding], corrections: Sequence[Finding]) -> list[Finding]:
     """Return findings with corrections in place of other findings on the same recordings.
 
-    A unit correction of a channel and recording that already have a unit finding is dropped. With a
-    correction of all recordings ("") only corrections are returned; else they come last.
+    A unit correction beside a unit finding is dropped; one of all recordings ("") replaces all.
     """
     same = {(f.channel, f.recording) for f in findings if f.kind == "unit"}
-    new = [
-        cure
-        for cure in corrections
-        if cure.kind != "unit" or (cure.channel, cure.recording) not in same
-    ]
-    where = {cure.recording for cure in new}
+    new = [f for f in corrections if f.kind != "unit" or (f.channel, f.recording) not in same]
+    where = {f.recording for f in new}
     if "" in where:
-        return list(new)
-    return [*[f for f in findings if f.recording not in where], *new]
+        return new
+    return [*(f for f in findings if f.recording not in where), *new]

@@ -10,15 +10,13 @@ from statistics import median
 from diagnosis.data_quality.finding import Finding, Severity
 from diagnosis.data_quality.model_agreement import OutputAgreement
 from engine.recordings.recording import Recording
-from language.expressions.units import Dimension, are_compatible, parse_unit
+from language.expressions.units import are_compatible, parse_unit
 from language.loading.recording_map_reader import column_dimension
 from language.model.automaton import Automaton
 from language.model.system import RecordingMap
 
 OFFSET_ERROR, OFFSET_WARNING = 0.1, 0.08
-"""Clock offsets [s] that are an error and a warning;
-actuators and sensors have lags up to 0.05 s.
-"""
+"""Clock offsets [s] that are errors and warnings; actuators and sensors have lags up to 0.05 s."""
 SINGLE_RECORDING_MARGIN = 0.1
 """Increase of the correlation from which a lag in a single recording of several is reported."""
 CLOCK_TOLERANCE = 0.04
@@ -51,14 +49,12 @@ def find_unit_sign_clock_errors(
     mapping: RecordingMap,
     recordings: Sequence[Recording],
 ) -> list[Finding]:
-    """Return findings on signs, units and clocks, for all recordings together or for single ones.
+    """Return findings on signs, units and clocks, for all recordings or for single ones.
 
-    Only clear agreements count. With a clear agreement in fewer than two recordings the findings of
-    each are returned. Otherwise an error that at least two and more than `SHARED_FRACTION` (0.6) of
-    the recordings show is reported once; then other findings are left out unless it is a clock
-    offset. If half of the recordings have unit errors, only these are returned. A clock offset of a
-    single recording is a warning and needs an increase of the correlation by more than
-    `SINGLE_RECORDING_MARGIN`.
+    With fewer than two clear recordings the findings of each are returned. Else an error that
+    `SHARED_FRACTION` of them show is reported once, and hides others unless it is a clock offset.
+    If half of the recordings have unit errors, only these are returned. A clock offset of a single
+    recording is a warning.
     """
     own = {
         recording.name: _find_errors(
@@ -70,53 +66,42 @@ def find_unit_sign_clock_errors(
         )
         for recording in recordings
     }
+    single = [finding for findings in own.values() for finding in findings]
     clear = {agreement.recording for agreement in agreements if agreement.is_clear}
     if len(clear) < 2:
-        return [finding for findings in own.values() for finding in findings]
+        return single
     shared = [
         finding
         for finding in _find_errors("", agreements, automaton, mapping, recordings)
         if _is_shared(finding, own, agreements)
     ]
-    outputs = {agreement.channel for agreement in agreements}
-    reported_kinds = {
-        kind for f in shared if f.channel not in outputs for kind in _similar_kinds(f.kind)
-    }
-    rest = [
-        f
-        for fs in own.values()
-        for f in fs
-        if not _has_similar(shared, f) and f.kind not in reported_kinds
-    ]
-    units = [f for findings in own.values() for f in findings if f.kind == "unit"]
+    units = [f for f in single if f.kind == "unit"]
     if 2 * len({f.recording for f in units}) >= len(recordings):
-        units = [f for f in shared if f.kind == "unit"] or units
-        return units  # Single recordings show which unit it is.
+        return [f for f in shared if f.kind == "unit"] or units  # single ones show which unit
     if any(finding.kind != "clock_offset" for finding in shared):
         return shared  # Other findings are consequences of these.
+    outputs = {agreement.channel for agreement in agreements}
+    reported = {kind for f in shared if f.channel not in outputs for kind in _similar_kinds(f.kind)}
+    rest = [f for f in single if not _has_similar(shared, f) and f.kind not in reported]
     sure = {
         r.recording
         for r in agreements
         if r.is_clear and r.correlation_gain > SINGLE_RECORDING_MARGIN
     }
-    return [
-        *shared,
-        *[
-            _weaken_clock_finding(f)
-            for f in rest
-            if f.kind != "clock_offset" or f.recording in sure
-        ],
-    ]
+    found = list(shared)
+    for finding in rest:
+        if finding.kind != "clock_offset":
+            found.append(finding)
+        elif finding.recording in sure:  # In a single recording an actuator may be slow instead.
+            found.append(replace(finding, severity="warning"))
+    return found
 
 
 def agrees_with_other_outputs(finding: Finding, agreements: Sequence[OutputAgreement]) -> bool:
     """Return whether a unit or scale finding is refuted by the level of the other outputs.
 
-    This is so if the median `level` of its channel is within `FACTOR_TOLERANCE` (30 %) of that of
-    the other clear outputs with a gain within `MAX_SCALE_RATIO`, in the same recordings. False for
-    other kinds of findings, without such outputs, or if a level is 0. Missing physics can make one
-    output oscillate much more than in the simulation, which looks like a scale error; a wrong unit
-    would change its level relative to the others.
+    Missing physics can make one output oscillate much more than in the simulation, which looks like
+    a scale error; a wrong unit would change its level relative to the others.
     """
     if finding.kind not in ("unit", "scale"):
         return False
@@ -134,9 +119,7 @@ def _is_shared(
     by_recording: Mapping[str, Sequence[Finding]],
     agreements: Sequence[OutputAgreement],
 ) -> bool:
-    """Return whether most of the recordings with a
-    clear agreement of the channel have this finding.
-    """
+    """Return whether most recordings with a clear agreement of the channel have this finding."""
     clear = {r.recording for r in agreements if r.is_clear and r.channel == finding.channel}
     count = sum(_has_similar(findings, finding) for findings in by_recording.values())
     if not clear:  # An input: if one output alone is clear, the finding names that output.
@@ -144,13 +127,6 @@ def _is_shared(
         kinds = _similar_kinds(finding.kind)
         count = sum(any(f.kind in kinds for f in findings) for findings in by_recording.values())
     return count >= 2 and count > SHARED_FRACTION * len(clear)
-
-
-def _weaken_clock_finding(finding: Finding) -> Finding:
-    """Return a clock finding as a warning: in single recordings an actuator may be slow instead."""
-    if finding.kind != "clock_offset":
-        return finding
-    return replace(finding, severity="warning")
 
 
 def _has_similar(findings: Sequence[Finding], finding: Finding) -> bool:
@@ -172,15 +148,11 @@ def _find_errors(
     mapping: RecordingMap,
     recordings: Sequence[Recording],
 ) -> list[Finding]:
-    """Return findings from the clear agreements of one recording, or of all for the name "".
-
-    Clock offsets are only reported if there are no sign and unit errors.
-    """
-    clear = [agreement for agreement in agreements if agreement.is_clear]
-    by_channel = {
-        channel: [r for r in clear if r.channel == channel]
-        for channel in dict.fromkeys(r.channel for r in clear)
-    }
+    """Return sign and unit errors of clear agreements, or clock errors if there are none."""
+    by_channel: dict[str, list[OutputAgreement]] = {}
+    for agreement in agreements:
+        if agreement.is_clear:
+            by_channel.setdefault(agreement.channel, []).append(agreement)
     if not by_channel:
         return []
     one = _AgreementsByChannel(name, recordings, automaton, mapping, by_channel)
@@ -211,30 +183,23 @@ class _AgreementsByChannel:
         ]
 
     def _attribute(self, channels: Sequence[str]) -> tuple[str, str]:
-        """Return the channel to report and its name in a sentence:
-        an input if all outputs are affected.
-        """
+        """Return the channel to report and its name: an input if all outputs are affected."""
         if len(channels) == len(self.gains) and self.inputs:
             if len(channels) > 1:
                 return self.inputs[0], f"input `{self.inputs[0]}`"
             return channels[0], f"`{channels[0]}` or input `{self.inputs[0]}`"
         return channels[0], f"`{channels[0]}`"
 
-    def _finding(self, kind: str, channel: str, text: str, severity: Severity) -> Finding:
-        """Return a finding on this recording."""
-        return Finding(kind, self.name, channel, text, severity)
-
     def find_sign_errors(self) -> list[Finding]:
         """Return errors for outputs with a negative gain; one for the input if all are negative."""
         odd = [name for name, gain in self.gains.items() if gain < 0.0]
         if not odd:
             return []
-        groups = [odd] if len(odd) == len(self.gains) else [[name] for name in odd]
         found = []
-        for group in groups:
+        for group in [odd] if len(odd) == len(self.gains) else [[name] for name in odd]:
             channel, called = self._attribute(group)
             text = f"{called} has the wrong sign: it moves against what the model gives"
-            found.append(self._finding("sign", channel, text, "error"))
+            found.append(Finding("sign", self.name, channel, text, "error"))
         return found
 
     def find_unit_errors(self) -> list[Finding]:
@@ -255,35 +220,38 @@ class _AgreementsByChannel:
         return found
 
     def _shared_scale_finding(self, outputs: Sequence[str], channel: str, subject: str) -> Finding:
-        """Return the finding on all outputs: a wrong scale of the input,
-        or a unit that they share.
-        """
+        """Return the finding on all outputs: a scale of the input or a shared unit."""
         size = median(abs(self.gains[name]) for name in outputs)
-        if not _unit_error_reason(1.0 / size, column_dimension(self.mapping.columns[channel])):
+        if not self._unit_error_reason(channel, 1.0 / size):
             reasons = {
-                _unit_error_reason(
-                    size, column_dimension(self.mapping.columns[name]), SHARED_FACTOR_TOLERANCE
-                )
-                for name in outputs
+                self._unit_error_reason(name, size, SHARED_FACTOR_TOLERANCE) for name in outputs
             }
             if len(reasons) == 1 and reasons != {""}:
                 both = " and ".join(f"`{name}`" for name in outputs)
                 text = f"{both} are {size:.3g} times what the model gives: {reasons.pop()}?"
-                return self._finding("unit", outputs[0], text, "error")
+                return Finding("unit", self.name, outputs[0], text, "error")
         return self._scale_finding(channel, subject, 1.0 / size, False)
 
     def _scale_finding(self, channel: str, subject: str, size: float, is_output: bool) -> Finding:
-        """Return a unit error if a factor of units explains the size,
-        else a warning on the scale.
-        """
-        dimension = column_dimension(self.mapping.columns[channel])
+        """Return a unit error if a factor explains the size, else a scale warning."""
         share = f"{size:.3g} times" if size > 1.0 else f"1/{1.0 / size:.3g} of"
-        source = _unit_error_reason(size, dimension)
-        what = f"{share} what the model {'gives' if is_output else 'needs'}"
-        text = f"{subject} is {what}" + (f": {source}?" if source else "")
+        text = f"{subject} is {share} what the model {'gives' if is_output else 'needs'}"
+        source = self._unit_error_reason(channel, size)
         if source:
-            return self._finding("unit", channel, text, "error")
-        return self._finding("scale", channel, text, "warning")
+            return Finding("unit", self.name, channel, f"{text}: {source}?", "error")
+        return Finding("scale", self.name, channel, text, "warning")
+
+    def _unit_error_reason(
+        self, channel: str, size: float, tolerance: float = FACTOR_TOLERANCE
+    ) -> str:
+        """Return the unit error that explains a ratio of measured to simulated, or ""."""
+        dimension = column_dimension(self.mapping.columns[channel])
+        distance, reason = min(
+            (abs(math.log(size / factor)), reason)
+            for factor, unit, reason in UNIT_FACTORS
+            if not unit or are_compatible(parse_unit(unit).dimension, dimension)
+        )
+        return reason if distance < math.log(1.0 + tolerance) else ""
 
     def find_clock_errors(self) -> list[Finding]:
         """Return findings on outputs with a larger lag than actuators and sensors have."""
@@ -292,46 +260,28 @@ class _AgreementsByChannel:
             return []
         lags = [self.lags[name] for name in odd]
         together = len(odd) == len(self.lags) and max(lags) - min(lags) < CLOCK_TOLERANCE
-        return [
-            self._clock_offset_finding(group, together)
-            for group in ([odd] if together else [[n] for n in odd])
-        ]
+        groups = [odd] if together else [[name] for name in odd]
+        return [self._clock_offset_finding(group, together) for group in groups]
 
     def _clock_offset_finding(self, channels: Sequence[str], is_shared: bool) -> Finding:
         """Return the clock finding on channels: an error if most agreements have the same lag."""
         lag = median(self.lags[name] for name in channels)
-        channel, called = (
-            self._attribute(channels) if is_shared else (channels[0], f"`{channels[0]}`")
-        )
+        channel, called = channels[0], f"`{channels[0]}`"
+        if is_shared:
+            channel, called = self._attribute(channels)
         later = (lag > 0.0) == (channel in self.lags)
         text = f"the clock of {called} is {abs(lag):.2f} s {'late' if later else 'early'}"
         if is_shared and len(channels) == 1 and self.inputs:
             both = f"`{channels[0]}` and input `{self.inputs[0]}`"
             text = f"the clocks of {both} are {abs(lag):.2f} s apart"
         each = [r.significant_lag for name in channels for r in self.relations[name]]
-        steady = sum(abs(one - lag) <= CLOCK_TOLERANCE for one in each) >= SHARED_FRACTION * len(
-            each
-        )
-        is_sure = steady and abs(lag) >= OFFSET_ERROR
-        return self._finding("clock_offset", channel, text, "error" if is_sure else "warning")
+        near = sum(abs(one - lag) <= CLOCK_TOLERANCE for one in each)
+        is_sure = near >= SHARED_FRACTION * len(each) and abs(lag) >= OFFSET_ERROR
+        severity: Severity = "error" if is_sure else "warning"
+        return Finding("clock_offset", self.name, channel, text, severity)
 
 
 def _varies(recording: Recording, name: str) -> bool:
     """Return whether a channel is recorded and not constant."""
     channel = recording.channels.get(name)
     return channel is not None and len(set(channel.values)) > 1
-
-
-def _unit_error_reason(
-    size: float, dimension: Dimension, tolerance: float = FACTOR_TOLERANCE
-) -> str:
-    """Return the unit error that explains a ratio of measured to simulated,
-    or "" if there is none.
-    """
-    near = [
-        (abs(math.log(size / factor)), reason)
-        for factor, unit, reason in UNIT_FACTORS
-        if not unit or are_compatible(parse_unit(unit).dimension, dimension)
-    ]
-    distance, reason = min(near)
-    return reason if distance < math.log(1.0 + tolerance) else ""

@@ -1,7 +1,4 @@
-"""Equation discovery: a formula for an unknown disturbance, found by regression and fitted.
-
-The formula is fitted as an effect of the language, like those of the library.
-"""
+"""Equation discovery: a formula for an unknown disturbance, fitted as an effect of the language."""
 
 from __future__ import annotations
 
@@ -62,11 +59,9 @@ def discover_equation(
 ) -> DiscoveredEquation | None:
     """Return the formula with the largest gain over the base of a comparison, or None.
 
-    At most `MAX_FITS` formulas, at the first `MAX_LOCATIONS` of `locations` (in the order of their
-    ranks) with a gain and no accepted effect, are fitted. The formula must gain `min_gain` [nats]
-    and explain the same share as an effect (`MIN_SHARE`). A formula at a location of higher rank,
-    fitted again from the parameters of the best one, replaces it if it has more than
-    `LEADING_FRACTION` of its gain. `log` gets a line for each fitted formula.
+    `MAX_FITS` formulas at the first `MAX_LOCATIONS` locations with a gain and no accepted effect
+    are fitted. The formula must gain `min_gain` [nats] and explain `MIN_SHARE`. One at a location
+    of higher rank, fitted again from the best one, replaces it with `LEADING_FRACTION` of its gain.
     """
     base, equations = compared.base, []
     for formula, location in _propose_formulas(model_set, base, locations):
@@ -98,17 +93,18 @@ def _format_equation(equation: DiscoveredEquation) -> str:
 def _propose_formulas(
     model_set: ModelSet, base: Estimate, locations: Sequence[Location]
 ) -> list[tuple[FormulaEffect, Location]]:
-    """Return the formulas to fit, at most `MAX_FITS`: the best at each location, then the next
-    best.
+    """Return up to `MAX_FITS` formulas: the best at each location, then the next best.
 
-    Candidates are the best single terms and a pair of terms at each location with a gain and
-    without an accepted effect. Formulas without a regression gain, or that the model does not
-    accept, are left out.
+    They are the best single terms and a pair of terms at each location.
     """
     options: list[tuple[float, Location, EquationRegression, tuple[TermColumns, ...]]] = []
     places = [one for one in locations if one.gain > 0.0 and not one.is_accepted][:MAX_LOCATIONS]
     for location in places:
-        model = _choose_base(model_set, base, location)
+        point = vector_of(
+            base.candidate, len(model_set.series), _values_beside_disturbance(base, location)
+        )
+        other = evaluate(base.candidate, model_set.series, base.noise_levels, point)
+        model = other if other.cost < base.cost else base
         excess = regression_at(model_set, model, location.section, location.place)
         ranked = rank_terms(excess.problem, excess.columns)
         options += [(gain, location, excess, (one,)) for gain, one in ranked[:MAX_FITS]]
@@ -133,21 +129,8 @@ def _propose_formulas(
 
 
 def _values_beside_disturbance(base: Estimate, location: Location) -> dict[str, float]:
-    """Return the parameters [SI] that were fitted
-    together with the free disturbance of a location.
-    """
+    """Return the parameters [SI] fitted beside the free disturbance of a location."""
     return (location.free_model or base).values(0)
-
-
-def _choose_base(model_set: ModelSet, base: Estimate, location: Location) -> Estimate:
-    """Return the base at its own parameters or at those beside the free disturbance,
-    which costs less.
-    """
-    point = vector_of(
-        base.candidate, len(model_set.series), _values_beside_disturbance(base, location)
-    )
-    other = evaluate(base.candidate, model_set.series, base.noise_levels, point)
-    return other if other.cost < base.cost else base
 
 
 def _fit_formula(
@@ -157,10 +140,7 @@ def _fit_formula(
     location: Location,
     starts: Sequence[Mapping[str, float]],
 ) -> DiscoveredEquation | None:
-    """Return a formula fitted from the best of several `starts` [SI] of the base's parameters.
-
-    The result is None if the model with the formula is invalid or the fit diverges.
-    """
+    """Return the formula fitted from the best of `starts` [SI]; None if invalid or diverged."""
     try:
         candidate = model_set.compile_candidate((formula.placed_effect,))
     except SpecError:
@@ -172,11 +152,8 @@ def _fit_formula(
         for k, one in enumerate(candidate.free_parameters):
             if one.name in formula.phases:
                 own[:, k] = [one.coordinate(value) for value in formula.phases[one.name]]
-        starting_fits.append(
-            evaluate(
-                candidate, model_set.series, base.noise_levels, ParameterVector(point.shared, own)
-            )
-        )
+        point = ParameterVector(point.shared, own)
+        starting_fits.append(evaluate(candidate, model_set.series, base.noise_levels, point))
     start = min(starting_fits, key=lambda one: one.cost).point
     estimate = estimate_parameters(candidate, model_set.series, base.noise_levels, start)
     if not np.isfinite(estimate.cost) or estimate.normal_equations is None:

@@ -1,7 +1,6 @@
 """Disturbance response: innovations of a model under a prescribed disturbance at one place.
 
-The disturbance is imposed through a disturbance state that is measured without noise, so the
-observer sets it to the prescribed values. Each term of a formula is tested by one such run.
+A disturbance state that is measured without noise imposes it: the observer sets it so.
 """
 
 from __future__ import annotations
@@ -9,8 +8,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 
@@ -44,10 +41,9 @@ class DisturbanceResponse:
     steady_state_gains: Reals = field(repr=False)
 
     def predict(self, disturbance: Sequence[Reals]) -> tuple[Prediction, ...]:
-        """Return the predictions of all recordings while the disturbance follows given values.
+        """Return the predictions while the disturbance [SI] follows values (samples,).
 
-        `disturbance` is in SI units, (samples,) for each recording; a prediction has all outputs of
-        the model with the disturbance, and no Huber limits.
+        A prediction has all outputs, and no Huber limits.
         """
         pages, recorded = self._with_disturbance(disturbance)
         predictor, substeps = self.candidate.predictor, self.candidate.compiled.substeps
@@ -58,23 +54,16 @@ class DisturbanceResponse:
         return runs.split()
 
     def predict_innovations(self, disturbance: Sequence[Reals]) -> list[Reals]:
-        """Return the innovations of compared outputs while the disturbance follows given values.
-
-        `disturbance` is (samples,) for each recording. The result is (samples, outputs) for each,
-        after the burn-in: the innovations of `predict`, without storing states.
-        """
+        """Return the innovations of `predict` after burn-in, (samples, outputs) each."""
         pages, recorded = self._with_disturbance(disturbance)
         predictor, substeps = self.candidate.predictor, self.candidate.compiled.substeps
         runs = predictor.predict_points(
             pages[np.newaxis], recorded, self.transient_gains, self.steady_state_gains, substeps
         )
-        edges = pairwise(recorded.starts.tolist())
-        return self._after_burn_in([runs[0][0][low:high] for low, high in edges])
+        return self.after_burn_in(np.split(runs[0][0], recorded.starts[1:-1]))
 
     def _with_disturbance(self, disturbance: Sequence[Reals]) -> tuple[Reals, StackedRecordings]:
-        """Return calibration pages, and the recordings
-        with the disturbance as a measured output.
-        """
+        """Return the pages, and recordings in which the disturbance is measured."""
         together, candidate = stack_recordings(self.series), self.candidate
         recorded, seen = together.recorded, candidate.predictor.outputs
         nothing = np.full((len(recorded.inputs), len(self.element_torques)), np.nan)
@@ -83,23 +72,11 @@ class DisturbanceResponse:
         first[:, : together.first_measured.shape[1]] = together.first_measured
         first[:, -1] = [values[np.argmax(np.isfinite(values))] for values in disturbance]
         with_outputs = dataclasses.replace(recorded, measured=np.ascontiguousarray(measured))
-        return candidate.calibration_pages(self._values, first), with_outputs
+        values = [self.model.values(k) for k in range(len(self.series))]
+        return candidate.calibration_pages(values, first), with_outputs
 
-    @cached_property
-    def _values(self) -> list[dict[str, float]]:
-        """The parameter values [SI] of each recording."""
-        return [self.model.values(k) for k in range(len(self.series))]
-
-    def innovations(self, predictions: Sequence[Prediction]) -> list[Reals]:
-        """Return the innovations of the compared outputs from predictions, (samples, outputs) each.
-
-        The burn-in of the first recording is cut off each; element torques and disturbance are left
-        out.
-        """
-        return self._after_burn_in([one.innovations for one in predictions])
-
-    def _after_burn_in(self, innovations: Sequence[Reals]) -> list[Reals]:
-        """Return the part of innovations after the burn-in, for the compared outputs."""
+    def after_burn_in(self, innovations: Sequence[Reals]) -> list[Reals]:
+        """Return the innovations of compared outputs after burn-in, (samples, outputs) each."""
         seen = len(self.model.candidate.predictor.outputs)
         skip = burn_in_samples(self.series[0])
         return [one[skip:, :seen] for one in innovations]
@@ -110,37 +87,31 @@ def build_disturbance_response(
 ) -> DisturbanceResponse:
     """Return the model of a fit, compiled with a disturbance at `section.place`.
 
-    The disturbance is named `probe_<place>`, cut to 25 characters. It has the effects of the fit
-    and all disturbances of the model set besides. Its Kalman gains are those of the fit; the gain
-    from the disturbance output to the disturbance state is 1. Raises SpecError if the disturbance
-    cannot be placed, KeyError for a section other than flow, elements and outputs.
+    Raises SpecError if the disturbance cannot be placed, KeyError for a section other than flow,
+    elements and outputs.
     """
     kind = DISTURBANCE_KIND_BY_SECTION[section]
     disturbance = model_set.scale_disturbance(disturbance_effect(kind, place))
     placed_effect = dataclasses.replace(disturbance, suffix=f"probe_{place}"[:25])
+    state = placed_effect.qualified_name(DISTURBANCE_STATE)
     torques = element_torques(model_set.automaton)
-    seen = (*model_set.output_names, *torques, placed_effect.qualified_name(DISTURBANCE_STATE))
-    document = _with_outputs(model_set.document, seen)
+    seen = (*model_set.output_names, *torques, state)
     candidate = compile_candidate(
-        document,
+        _with_outputs(model_set.document, seen),
         model_set.project,
         model.candidate.placed_effects,
         (*model_set.disturbances, placed_effect),
         seen,
         model_set.period,
     )
-    first, steady = _embed_gains(candidate, model, placed_effect.qualified_name(DISTURBANCE_STATE))
+    first, steady = _embed_gains(candidate, model, state)
     return DisturbanceResponse(model, candidate, model_set.series, torques, first, steady)
 
 
 def element_torques(automaton: Automaton) -> tuple[str, ...]:
-    """Return the names of the torques of elements, in the order of the elements.
-
-    Only elements whose `torque` is a single name are included, not those with an expression.
-    """
-    trees = [
-        one.parts["torque"].tree for one in automaton.elements.values() if "torque" in one.parts
-    ]
+    """Return the torques of elements that are single names, in the order of elements."""
+    torques = [one.parts.get("torque") for one in automaton.elements.values()]
+    trees = [torque.tree for torque in torques if torque is not None]
     return tuple(tree.path for tree in trees if isinstance(tree, Name))
 
 
@@ -157,22 +128,15 @@ def _with_outputs(document: Document, names: Sequence[str]) -> Document:
 
 
 def _embed_gains(candidate: Candidate, model: Estimate, disturbance: str) -> tuple[Reals, Reals]:
-    """Return the Kalman gains of a model at the indices of a candidate with more states and
-    outputs.
-
-    The gain from the disturbance output to the disturbance state is 1, all others are 0.
-    """
-    states, known = candidate.predictor.states, model.candidate.predictor
-    rows = [states.index(name) for name in known.states]
-    columns = [candidate.predictor.outputs.index(name) for name in known.outputs]
-    place = np.ix_(rows, columns)
-    first = np.zeros((len(model.gains.transient), len(states), len(candidate.predictor.outputs)))
-    steady = np.zeros((len(candidate.predictor.modes), *first.shape[1:]))
-    for k, gain in enumerate(model.gains.transient):
-        first[k][place] = gain
-    for k, mode in enumerate(candidate.predictor.modes):
-        steady[k][place] = model.gains.steady_state[known.modes.index(mode)]
-    row, column = states.index(disturbance), candidate.predictor.outputs.index(disturbance)
-    first[:, row, column] = 1.0
-    steady[:, row, column] = 1.0
-    return first, steady
+    """Return the gains of a model in a larger candidate, with 1 from disturbance to its state."""
+    whole, known = candidate.predictor, model.candidate.predictor
+    rows = np.array([whole.states.index(name) for name in known.states])
+    columns = [whole.outputs.index(name) for name in known.outputs]
+    steady_state = model.gains.steady_state[[known.modes.index(mode) for mode in whole.modes]]
+    embedded = []
+    for gains in (model.gains.transient, steady_state):
+        larger = np.zeros((len(gains), len(whole.states), len(whole.outputs)))
+        larger[:, rows[:, np.newaxis], columns] = gains
+        larger[:, whole.states.index(disturbance), whole.outputs.index(disturbance)] = 1.0
+        embedded.append(larger)
+    return embedded[0], embedded[1]

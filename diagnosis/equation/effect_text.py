@@ -28,10 +28,7 @@ RANGE_FACTOR = 10.0
 
 @dataclass(frozen=True)
 class FormulaEffect:
-    """An effect that consists of terms, with the `text` of its file.
-
-    `initial_values` are the start values of a fit, `phases` those of parameters per recording.
-    """
+    """An effect made of terms; `phases` are start values of parameters per recording."""
 
     placed_effect: PlacedEffect
     text: str = field(repr=False)
@@ -44,18 +41,10 @@ class FormulaEffect:
     ) -> str:
         """Return the formula with fitted values, such as `12.3 N*m * sin(3 * angle of w_w + 0.40)`.
 
-        The terms are joined with ` + `. `values` are the fitted quantities by qualified name,
-        `fitted` the values [SI] of each recording: a coefficient per recording is a list `{1.2,
-        3.4} N*m`, and a phase is the word `phase` if there are several recordings.
+        `values` are quantities by qualified name, `fitted` the values [SI] of each recording.
         """
         return " + ".join(
-            _format_term(
-                term,
-                k,
-                values,
-                [{n: v for n, v in one.items()} for one in fitted],
-                self.placed_effect,
-            )
+            _format_term(term, k, values, fitted, self.placed_effect)
             for k, term in enumerate(self.terms, 1)
         )
 
@@ -68,13 +57,10 @@ def build_formula(
     weights: Sequence[Reals],
     number: int = 1,
 ) -> FormulaEffect:
-    """Return the sum of terms as an effect, with initial values.
+    """Return the sum of terms as an effect `unknown_<number>_at_<place>`, with initial values.
 
-    Its name is `unknown_<number>_at_<place>`. `weights` are the coefficients of each term,
-    (recordings, waves). A coefficient starts at their root mean square over recordings for a sine
-    or a coefficient per recording, else at their mean; its range is `RANGE_FACTOR` times the root
-    mean square. A model set identifies candidates by effect names, so `number` must be unique.
-    Raises SpecError if the text of the effect is invalid.
+    `weights` are the coefficients of each term, (recordings, waves). A model set identifies
+    candidates by effect names, so `number` must be unique. Raises SpecError for an invalid text.
     """
     parts = [
         _term_text(model_set, section, place, k, *pair)
@@ -86,17 +72,9 @@ def build_formula(
     effect = read_effect(_parse_text(name, text), problems)
     problems.raise_if_errors()
     placed_effect = PlacedEffect(effect, place, place)
-    start, phases = {}, {}
-    for part in parts:
-        start.update(
-            {
-                placed_effect.qualified_name(name): value
-                for name, value in part.initial_values.items()
-            }
-        )
-        phases.update(
-            {placed_effect.qualified_name(name): value for name, value in part.phases.items()}
-        )
+    full = placed_effect.qualified_name
+    start = {full(name): one for part in parts for name, one in part.initial_values.items()}
+    phases = {full(name): one for part in parts for name, one in part.phases.items()}
     return FormulaEffect(placed_effect, text, tuple(terms), start, phases)
 
 
@@ -171,14 +149,11 @@ def _rename_states(text: str, final_names: Mapping[str, str]) -> str:
 def _coefficient_unit(model_set: ModelSet, section: str, place: str, term: LibraryTerm) -> str:
     """Return the unit of a coefficient: the unit at the place over that of the term."""
     whole = parse_unit(disturbance_unit(model_set, section, place) or "1").dimension
-    kind = TreeTypes(model_set.document.root).type_of_formula(
-        ScalarNode(term.unit_expression or term.text, Span(Source("term"), 1, 1))
-    )
-    return (
-        format_si_unit(dimension_product(whole, kind, -1))
-        if isinstance(kind, Dimension)
-        else format_si_unit(whole)
-    )
+    scalar = ScalarNode(term.unit_expression or term.text, Span(Source("term"), 1, 1))
+    kind = TreeTypes(model_set.document.root).type_of_formula(scalar)
+    if isinstance(kind, Dimension):
+        whole = dimension_product(whole, kind, -1)
+    return format_si_unit(whole)
 
 
 def _effect_text(
@@ -214,7 +189,7 @@ def _effect_text(
         lines += [f"{key}:", *(f"  {line}" for line in own)] if own else []
     lines += ["equations:", *(f"  {_quote_value(line)}" for line in equations)] if equations else []
     if section == "flow":
-        lines += ["terms:", f"  $x: {{unknown: {_quote_flow_value(whole)}}}"]
+        lines += ["terms:", f"  $x: {{{_quote_value(f'unknown: {whole}')}}}"]
     if section == "outputs":
         lines.append("redirect: {outputs: {$y: shown}}")
     return "\n".join(lines) + "\n"
@@ -224,11 +199,6 @@ def _quote_value(line: str) -> str:
     """Return a line `key: value` with the value quoted if it contains a comma."""
     key, _, value = line.partition(": ")
     return f'{key}: "{value}"' if "," in value else line
-
-
-def _quote_flow_value(text: str) -> str:
-    """Return a value quoted if it contains a comma."""
-    return f'"{text}"' if "," in text else text
 
 
 def _format_term(
@@ -241,14 +211,13 @@ def _format_term(
     """Return term number `k` with its fitted coefficient and phase."""
     amount = values[placed_effect.qualified_name(f"a_{k}")]
     unit = "" if amount.unit == "1" else f" {amount.unit}"
-    own = [one[placed_effect.qualified_name(f"a_{k}")] for one in fitted]
     number = f"{amount.value:.4g}{unit}"
     if term.per_recording:
+        own = [one[placed_effect.qualified_name(f"a_{k}")] for one in fitted]
         number = f"{{{', '.join(f'{one:.3g}' for one in own)}}}{unit}"
     factor = "" if term.text == "1" else f" * {term.text}"
     if not term.order:
-        late = f" ({term.name})" if term.states else ""
-        return number + factor + late
+        return number + factor + (f" ({term.name})" if term.states else "")
     rate = next(iter(term.states.values()))[1].split("= ")[1]
     phases = [one[placed_effect.qualified_name(f"ph_{k}")] for one in fitted]
     phase = f"{phases[0]:.2f}" if len(phases) == 1 else "phase"

@@ -1,7 +1,4 @@
-"""Forward regression: sparse selection of terms that explain innovations, with a BIC penalty.
-
-All computations use products of columns, which are formed once for each part of each recording.
-"""
+"""Forward regression: sparse selection of terms that explain innovations, with a BIC penalty."""
 
 from __future__ import annotations
 
@@ -20,10 +17,7 @@ RIDGE = 1e-6
 
 @dataclass(frozen=True)
 class TermColumns:
-    """A term as columns of a problem, at the indices `places`.
-
-    With `has_recording_coefficients` each recording has coefficients of its own.
-    """
+    """A term as the columns `places` of a problem, with shared or recording coefficients."""
 
     name: str
     places: tuple[int, ...]
@@ -34,8 +28,8 @@ class TermColumns:
 class RegressionProblem:
     """The products of columns and innovations, (recordings, parts, columns, columns).
 
-    The last column is the innovations. The first `parameters` columns are parameters of the model
-    in prior standard deviations. `samples` is the number of innovations.
+    The first `parameters` columns are parameters in prior standard deviations, the last one the
+    innovations; `samples` is their number.
     """
 
     products: Reals = field(repr=False)
@@ -46,9 +40,7 @@ class RegressionProblem:
 
 @dataclass(frozen=True)
 class SelectedTerm:
-    """A selected term with its penalised gain and its
-    cross-validated gain over earlier terms [nats].
-    """
+    """A term with its penalised and its cross-validated gain over earlier terms [nats]."""
 
     columns: TermColumns
     gain: float
@@ -64,8 +56,7 @@ def build_problem(
     """Return the regression problem of normalised innovations (samples,) of each recording.
 
     `parameters` (samples, parameters) and `features` (samples, columns) of each recording are the
-    decreases of the innovations per unit of each coefficient. Each recording is cut into `FOLDS`
-    (4) parts of consecutive samples, whose products are kept apart for the cross-validation.
+    decreases of the innovations per unit of each coefficient.
     """
     products = []
     for e, moved, wave in zip(innovations, parameters, features, strict=True):
@@ -80,11 +71,7 @@ def build_problem(
 def rank_terms(
     problem: RegressionProblem, columns: Sequence[TermColumns]
 ) -> list[tuple[float, TermColumns]]:
-    """Return the penalised gain [nats] of each term alone, with the term, in descending order.
-
-    The gain is the decrease of the cost, with the model's parameters fitted as well, minus the BIC
-    penalty of the term; it can be negative. Equal gains keep the order of `columns`.
-    """
+    """Return the penalised gain [nats] of each term alone with the term, in descending order."""
     before = _cost(problem, [])
     ranked = [
         (before - _cost(problem, [one]) - _complexity_penalty(problem, one), one) for one in columns
@@ -97,9 +84,8 @@ def select_terms(
 ) -> list[SelectedTerm]:
     """Return the terms of a forward selection, at most `max_terms`, in the order of selection.
 
-    Each step takes the term with the largest penalised gain over the terms before it; the selection
-    ends when that is below `min_gain` [nats]. A term after the first must also have a
-    cross-validated gain of at least `min_gain`; if it has not, the selection ends.
+    It ends when the penalised gain, or the cross-validated one of a further term, is below
+    `min_gain` [nats].
     """
     chosen: list[SelectedTerm] = []
     selected: list[TermColumns] = []
@@ -112,23 +98,17 @@ def select_terms(
         ]
         if not gains or max(gains) < min_gain:
             break
-        best = rest[int(np.argmax(gains))]
-        left_out = _cross_validated_cost(problem, selected) - _cross_validated_cost(
-            problem, [*selected, best]
-        )
+        larger = [*selected, rest[int(np.argmax(gains))]]
+        left_out = _cross_validated_cost(problem, selected) - _cross_validated_cost(problem, larger)
         if selected and left_out < min_gain:
             break
-        selected.append(best)
-        chosen.append(SelectedTerm(best, max(gains), left_out))
+        selected = larger
+        chosen.append(SelectedTerm(selected[-1], max(gains), left_out))
     return chosen
 
 
 def coefficients_of(problem: RegressionProblem, selected: Sequence[TermColumns]) -> list[Reals]:
-    """Return the least-squares coefficients of each selected term, (recordings, waves) each.
-
-    The model's parameters are fitted together with them, with their priors. A term without
-    coefficients per recording has the same row for each recording.
-    """
+    """Return the least-squares coefficients of each selected term, (recordings, waves) each."""
     fit = _solve_least_squares(problem, selected, np.sum(problem.products, axis=1))
     shared, own = problem.parameters, 0
     coefficients = []
@@ -147,9 +127,8 @@ def coefficients_of(problem: RegressionProblem, selected: Sequence[TermColumns])
 def _complexity_penalty(problem: RegressionProblem, term: TermColumns) -> float:
     """Return the BIC penalty [nats] of a term, with the effective number of samples."""
     count = len(term.places) * (len(problem.products) if term.has_recording_coefficients else 1)
-    return float(
-        0.5 * count * np.log(max(problem.samples / problem.integrated_autocorrelation, 2.0))
-    )
+    effective = max(problem.samples / problem.integrated_autocorrelation, 2.0)
+    return float(0.5 * count * np.log(effective))
 
 
 def _cost(problem: RegressionProblem, selected: Sequence[TermColumns]) -> float:
@@ -175,9 +154,7 @@ def _cross_validated_cost(problem: RegressionProblem, selected: Sequence[TermCol
 
 @dataclass(frozen=True)
 class _LeastSquaresFit:
-    """The shared coefficients, those per recording (recordings, n),
-    and the residual squares with priors.
-    """
+    """Coefficients, those per recording (recordings, n), and residual squares with priors."""
 
     shared: Reals
     per_recording: Reals
@@ -187,10 +164,7 @@ class _LeastSquaresFit:
 def _solve_least_squares(
     problem: RegressionProblem, selected: Sequence[TermColumns], products: Reals
 ) -> _LeastSquaresFit:
-    """Return the coefficients; those per recording are eliminated by Schur complements.
-
-    `products` (recordings, columns, columns) are summed over the parts that are used.
-    """
+    """Return the least-squares fit; recording coefficients go by Schur complements."""
     shared = problem.parameters + sum(
         len(one.places) for one in selected if not one.has_recording_coefficients
     )
@@ -215,9 +189,6 @@ def _selected_products(
     problem: RegressionProblem, selected: Sequence[TermColumns], products: Reals
 ) -> tuple[Reals, Reals]:
     """Return the products of the used columns: parameters, shared terms, terms per recording."""
-    shared = [
-        place for one in selected if not one.has_recording_coefficients for place in one.places
-    ]
-    own = [place for one in selected if one.has_recording_coefficients for place in one.places]
-    places = [*range(problem.parameters), *shared, *own]
+    shared_first = sorted(selected, key=lambda one: one.has_recording_coefficients)
+    places = [*range(problem.parameters), *(place for one in shared_first for place in one.places)]
     return products[np.ix_(places, places)], products[places, -1]

@@ -36,17 +36,15 @@ class EquationRegression:
 def regression_at(
     model_set: ModelSet, model: Estimate, section: str, place: str
 ) -> EquationRegression:
-    """Return the regression of a model's innovations on the terms of `generate_terms` at a place.
+    """Return the regression of innovations on the terms of `generate_terms` at a place.
 
-    The columns are the responses of the innovations to each term as a disturbance at
-    `section.place`, preceded by the derivatives for the model's own parameters; all are weighted by
-    inverse standard deviations and Huber weights. Raises SpecError if no disturbance can be placed
-    there.
+    Responses to terms and parameters are weighted by inverse standard deviations and Huber weights.
+    Raises SpecError if no disturbance can be placed there.
     """
     probe = build_disturbance_response(model_set, section, place, model)
     zero_disturbance = [np.zeros(one.count) for one in model_set.series]
     runs = probe.predict(zero_disturbance)
-    before = probe.innovations(runs)
+    before = probe.after_burn_in([one.innovations for one in runs])
     weigh = _HuberWeights(model, before)
     signals = _formula_signals(model_set, probe, runs)
     output = place_bindings(model_set, section, place).get("y", "") if section == "outputs" else ""
@@ -68,11 +66,7 @@ def regression_at(
 
 
 class _HuberWeights:
-    """Weights of innovations: inverse standard deviations, reduced beyond the Huber limits.
-
-    The weight is multiplied by sqrt(limit / |e|) beyond the limit (Huber 1964); unknown ones have
-    0.
-    """
+    """Inverse standard deviations times sqrt(limit / |e|) beyond the limit (Huber 1964), or 0."""
 
     def __init__(self, model: Estimate, innovations: Sequence[Reals]) -> None:
         size = np.sqrt(model.prediction.variances)
@@ -94,9 +88,7 @@ def _weighted_response(
     values: Sequence[Reals],
     weights: _HuberWeights,
 ) -> tuple[Reals, ...]:
-    """Return the weighted decrease of innovations per unit of a disturbance `values`,
-    by recording.
-    """
+    """Return the weighted decrease of innovations per unit of a disturbance, by recording."""
     size = float(np.sqrt(np.mean(np.concatenate(values) ** 2))) or 1.0
     after = response.predict_innovations([one * (TEST_DISTURBANCE / size) for one in values])
     moved = [(a - b) * (size / TEST_DISTURBANCE) for a, b in zip(before, after, strict=True)]
@@ -104,13 +96,10 @@ def _weighted_response(
 
 
 def _parameter_responses(model: Estimate, weights: _HuberWeights) -> tuple[Reals, ...]:
-    """Return the weighted decrease of innovations per coordinate (samples * outputs,
-    parameters).
-    """
+    """Return the weighted decreases per coordinate, (samples * outputs, parameters) each."""
+    slices = model.prediction.slices
     columns = [
-        weights.weight_and_flatten(
-            [-model.jacobian[name][part] for part in model.prediction.slices]
-        )
+        weights.weight_and_flatten([-model.jacobian[name][part] for part in slices])
         for name in model.candidate.names
     ]
     return tuple(np.stack(one, axis=1) for one in zip(*columns, strict=True))
@@ -120,22 +109,22 @@ def _formula_signals(
     model_set: ModelSet, response: DisturbanceResponse, runs: Sequence[Prediction]
 ) -> Signals:
     """Return the signals that formulas may read: states, inputs, element torques and twists."""
-    predictor = response.candidate.predictor
+    predictor, automaton = response.candidate.predictor, model_set.automaton
     known = TreeTypes(model_set.document.root)
     values: dict[str, list[Reals]] = {}
-    for name in model_set.automaton.states:
+    for name in automaton.states:
         column = predictor.states.index(name)
         values[name] = [one.states[:, column] for one in runs]
-    for column, name in enumerate(model_set.automaton.inputs):
+    for column, name in enumerate(automaton.inputs):
         values[name] = [one.inputs[:, column] for one in model_set.series]
     for name in response.element_torques:
         column = predictor.outputs.index(name)
         values[name] = [one.outputs[:, column] for one in runs]
     stretches = []
-    for name, element in model_set.automaton.elements.items():
+    for name, element in automaton.elements.items():
         if element.kind == "elastic":
-            twist = place_bindings(model_set, "elements", name).get("twist", "")
-            gap = place_bindings(model_set, "elements", name).get("gap", "")
+            bindings = place_bindings(model_set, "elements", name)
+            twist, gap = bindings.get("twist", ""), bindings.get("gap", "")
             if twist in values and gap in values:
                 text = f"({twist} - {gap})"
                 values[text] = [a - b for a, b in zip(values[twist], values[gap], strict=True)]
@@ -146,16 +135,10 @@ def _formula_signals(
     for name in values:
         kind = known.type_of_name(name.strip("()").split(" ")[0])
         units[name] = format_si_unit(kind) if isinstance(kind, Dimension) else "1"
-    speeds = tuple(
-        placed_effect.place
-        for placed_effect in model_set.disturbances
-        if placed_effect.place in values
-    )
+    speeds = tuple(one.place for one in model_set.disturbances if one.place in values)
     forces = {units[name] for name in response.element_torques} | {"N*m", "N"}
-    torques = (
-        *(name for name in model_set.automaton.inputs if units[name] in forces),
-        *response.element_torques,
-    )
+    driven = [name for name in automaton.inputs if units[name] in forces]
+    torques = (*driven, *response.element_torques)
     rates = tuple(name for name in angle_rates(model_set) if name in values)
     period = float(model_set.period)
     return Signals(values, units, speeds, torques, tuple(stretches), rates, period)

@@ -1,7 +1,6 @@
 """Term library: the terms from which a formula of an unknown disturbance may be built.
 
-Each term is an expression of the language with its values, and has a coefficient. A term with an
-order is a sine of an angle, with a phase as well.
+A term is an expression of the language with its values; one with an order is a sine of an angle.
 """
 
 from __future__ import annotations
@@ -10,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.signal import lfilter
 
 from diagnosis.data.array_types import Reals
 
@@ -25,13 +25,11 @@ LIMIT_FRACTIONS = (0.4, 0.6, 0.8)
 
 @dataclass(frozen=True)
 class LibraryTerm:
-    """A summand without its coefficient.
+    """A summand without its coefficient; with an `order`, `text` is the factor of a sine.
 
-    `text` is an expression; with an `order` it is the factor of the sine of `order` times the angle
-    `th`, a state of the term. `states` are the states that the term adds: name to unit and flow.
-    `values` are the waves, (samples,) for each recording; a sine has two. `per_recording` gives
-    each recording a coefficient. `unit_expression` has the unit of the term if `text` reads its
-    states.
+    `states` are name to unit and flow of added states; `th` is the angle of an order. `values` are
+    the waves, (samples,) for each recording; a sine has two. `unit_expression` has the unit of a
+    `text` that reads states.
     """
 
     name: str
@@ -50,9 +48,7 @@ class LibraryTerm:
 
 @dataclass(frozen=True)
 class Signals:
-    """The signals of terms: values (samples,) of each recording and units by name,
-    and their roles.
-    """
+    """The values (samples,) of each recording, units and roles of the signals of terms."""
 
     values: Mapping[str, Sequence[Reals]] = field(repr=False)
     units: Mapping[str, str]
@@ -70,20 +66,16 @@ class Signals:
 def generate_terms(signals: Signals, section: str, output: str = "") -> Iterator[LibraryTerm]:
     """Yield the terms that may act at a place of a section, with their values.
 
-    First come a constant and a constant of each recording. For section "outputs" follow only terms
-    of the signal `output`: itself, lags and orders (multiples) of each angle. For any other
-    section: sign, value and square of each speed; powers, magnitude, limits, products with speeds,
-    lags, rate limits and growth of each torque; powers 2 and 3 and lags of each deflection; and
-    orders of each angle, alone and times each torque. The tested values are `ORDERS`, `LAGS`,
-    `RISE_TIMES`, `LIMIT_FRACTIONS`.
+    For "outputs" these are constants and terms of the signal `output`.
     """
-    count = {name: [len(one) for one in values] for name, values in signals.values.items()}
-    lengths = next(iter(count.values()))
-    ones = [np.ones(n) for n in lengths]
+    ones = [np.ones(len(values)) for values in next(iter(signals.values.values()))]
     yield _linear_term("a constant", "1", ones)
     yield LibraryTerm("a constant of each recording", "1", (tuple(ones),), per_recording=True)
     if section == "outputs":
-        yield from _signal_terms(signals, output)
+        yield _linear_term(output, output, signals.values[output])
+        yield from _lag_terms(signals, output)
+        for rate in signals.angle_rates:
+            yield from _order_terms(signals, rate, output, signals.values[output])
         return
     yield from _speed_terms(signals)
     for name in signals.torques:
@@ -100,14 +92,6 @@ def generate_terms(signals: Signals, section: str, output: str = "") -> Iterator
 def _linear_term(name: str, text: str, values: Sequence[Reals]) -> LibraryTerm:
     """Return a term with one coefficient."""
     return LibraryTerm(name, text, (tuple(values),))
-
-
-def _signal_terms(signals: Signals, output: str) -> Iterator[LibraryTerm]:
-    """Yield the terms of an output: itself, its lags and its orders."""
-    yield _linear_term(output, output, signals.values[output])
-    yield from _lag_terms(signals, output)
-    for rate in signals.angle_rates:
-        yield from _order_terms(signals, rate, output, signals.values[output])
 
 
 def _speed_terms(signals: Signals) -> Iterator[LibraryTerm]:
@@ -133,9 +117,7 @@ def _power_terms(signals: Signals, name: str, powers: Sequence[int]) -> Iterator
 
 
 def _torque_terms(signals: Signals, name: str) -> Iterator[LibraryTerm]:
-    """Yield the terms of a torque: powers, magnitude, limits, products with speeds, lags,
-    growth.
-    """
+    """Yield powers, limits, speed products, lags, rate limits and growth of a torque."""
     values = signals.values[name]
     yield from _power_terms(signals, name, (1, 2, 3))
     yield _linear_term(f"the amount of {name}", f"abs({name})", [np.abs(x) for x in values])
@@ -149,16 +131,10 @@ def _torque_terms(signals: Signals, name: str) -> Iterator[LibraryTerm]:
         yield from _torque_speed_terms(signals, name, speed)
     yield from _lag_terms(signals, name)
     yield from _rate_limit_terms(signals, name)
-    period = signals.period
-    clock = {"t": ("s", "der(t) = 1")}
-    growing = [x * period * np.arange(len(x)) for x in values]
-    yield LibraryTerm(
-        f"{name} that grows with time",
-        f"{name} * t",
-        (tuple(growing),),
-        clock,
-        unit_expression=f"{name} * (1 s)",
-    )
+    clock, seconds = {"t": ("s", "der(t) = 1")}, f"{name} * (1 s)"
+    growing = (tuple(x * signals.period * np.arange(len(x)) for x in values),)
+    label, text = f"{name} that grows with time", f"{name} * t"
+    yield LibraryTerm(label, text, growing, clock, unit_expression=seconds)
 
 
 def _torque_speed_terms(signals: Signals, torque: str, speed: str) -> Iterator[LibraryTerm]:
@@ -170,16 +146,17 @@ def _torque_speed_terms(signals: Signals, torque: str, speed: str) -> Iterator[L
     lost = [np.abs(x) * np.tanh(w / bend) for x, w in values]
     yield _linear_term(f"the amount of {torque} against {speed}", f"abs({torque}) * {sign}", lost)
     yield _linear_term(f"{torque} times {speed}", f"{torque} * {speed}", [x * w for x, w in values])
+    if (unit, of_speed) != ("N*m", "rad/s"):
+        return
     power = max(float(np.max(np.abs(x * w))) for x, w in values)
+    floor = _round_two_digits(0.02 * signals.largest(speed))
     for part in LIMIT_FRACTIONS:
         most = _round_two_digits(part * power)
-        floor = _round_two_digits(0.02 * signals.largest(speed))
         limit = [most / np.maximum(np.abs(w), floor) for _, w in values]
         over = [x - np.clip(x, -b, b) for (x, _), b in zip(values, limit, strict=True)]
         bound = f"{most:g} W / max(abs({speed}), {floor:g} {of_speed})"
         text = f"({torque} - clip({torque}, -({bound}), {bound}))"
-        if (unit, of_speed) == ("N*m", "rad/s"):
-            yield _linear_term(f"{torque} where its power is beyond {most:g} W", text, over)
+        yield _linear_term(f"{torque} where its power is beyond {most:g} W", text, over)
 
 
 def _lag_terms(signals: Signals, name: str) -> Iterator[LibraryTerm]:
@@ -218,20 +195,14 @@ def _limit_rate(values: Reals, max_change: float) -> Reals:
 def _low_pass(values: Reals, lag: float, period: float) -> Reals:
     """Return a signal after a first-order lag with time constant `lag` [s]."""
     kept = np.exp(-period / lag)
-    found, now = np.empty_like(values), float(values[0])
-    for k, value in enumerate(values):
-        now = kept * now + (1.0 - kept) * float(value)
-        found[k] = now
-    return found
+    late, _ = lfilter([1.0 - kept], [1.0, -kept], values, zi=[kept * values[0]])
+    return np.asarray(late, dtype=np.float64)
 
 
 def _order_terms(
     signals: Signals, rate: str, name: str, factor: Sequence[Reals]
 ) -> Iterator[LibraryTerm]:
-    """Yield sine and cosine waves of orders of an angle, times a signal.
-
-    Orders whose frequency exceeds 0.3 of the sample rate are left out.
-    """
+    """Yield waves of the orders of an angle below 0.3 of the sample rate, times a signal."""
     angles = [np.cumsum(w) * signals.period for w in signals.values[rate]]
     fastest = signals.largest(rate) / (2.0 * np.pi)
     for order in ORDERS:

@@ -1,8 +1,8 @@
 """Discriminating experiment: the manoeuvre that separates candidates best (T-optimality).
 
-The outputs of one candidate are predicted by another one with its observer, after its parameters
-have moved as far as the existing recordings allow. Half the remaining squares over the variances of
-innovations is the expected log Bayes factor [nats] (Atkinson, Fedorov 1975).
+One candidate predicts the outputs of another one, after its parameters have moved as far as the
+recordings allow. Half the remaining squares over the variances is the expected log Bayes factor
+[nats] (Atkinson, Fedorov 1975).
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ MIN_LOG_BAYES_FACTOR = 20.0
 
 @dataclass(frozen=True)
 class CandidateExperiment:
-    """A manoeuvre with the smallest expected log Bayes factor [nats] of all pairs of candidates.
+    """A manoeuvre with its smallest expected log Bayes factor [nats] of all pairs.
 
-    `outputs` (samples, outputs) are the simulated ones of each candidate, in the order of the plan.
+    `outputs` (samples, outputs) are those of each candidate.
     """
 
     manoeuvre: Manoeuvre
@@ -50,19 +50,11 @@ class ExperimentPlan:
 
     @property
     def is_discriminating(self) -> bool:
-        """Whether the first option reaches `MIN_LOG_BAYES_FACTOR` (20 nats).
-
-        False without options.
-        """
+        """Whether an option reaches `MIN_LOG_BAYES_FACTOR` (20 nats)."""
         return bool(self.options) and self.options[0].log_bayes_factor >= MIN_LOG_BAYES_FACTOR
 
     def format_sentence(self) -> str:
-        """Return in one sentence what to record.
-
-        It is "to tell a from b and c, record: X (45 nats expected, 20 are enough)" with the names
-        of the candidates and the first manoeuvre X. If it does not discriminate, the sentence is
-        "no manoeuvre that was tried would tell a from b and c".
-        """
+        """Return what to record to tell the candidates apart, in one sentence."""
         names = " from ".join((self.names[0], " and ".join(self.names[1:])))
         if not self.is_discriminating:
             return f"no manoeuvre that was tried would tell {names}"
@@ -78,9 +70,8 @@ def plan_experiment(
 ) -> ExperimentPlan | None:
     """Return the plan for the first `MAX_CANDIDATES` (3) of the named, fitted candidates.
 
-    The options are the manoeuvres for the model set in descending order of the smallest expected
-    log Bayes factor of all ordered pairs. Manoeuvres in which a candidate diverges are left out.
-    The result is None for fewer than two candidates or without a manoeuvre.
+    Manoeuvres in which a candidate diverges are left out. None below two candidates or without a
+    manoeuvre.
     """
     some = list(candidates)[:MAX_CANDIDATES]
     if len(some) < 2:
@@ -114,11 +105,10 @@ def _simulate_outputs(model: Estimate, series: SampledRecording) -> Reals | None
 def _expected_log_bayes_factor(
     model: Estimate, recorded: Sequence[SampledRecording], series: SampledRecording, outputs: Reals
 ) -> float:
-    """Return the expected log Bayes factor [nats] against a model for the outputs of another one.
+    """Return the expected log Bayes factor [nats] against a model for another one's outputs.
 
-    The parameters move by one Gauss-Newton step, with the information of the recordings `recorded`
-    as their prior. The result is divided by the integrated autocorrelation; it is 0 if the model
-    diverges.
+    The parameters move by one Gauss-Newton step, with the information of `recorded` as prior. The
+    result is 0 if the model diverges.
     """
     record = dataclasses.replace(series, measured=np.ascontiguousarray(outputs))
     point = vector_of(model.candidate, 1, model.values(0))
@@ -146,9 +136,7 @@ def _expected_log_bayes_factor(
 def _normalised_innovations(
     model: Estimate, record: SampledRecording, point: ParameterVector
 ) -> Reals | None:
-    """Return innovations over their standard deviations (samples * outputs,);
-    None if it diverges.
-    """
+    """Return innovations over standard deviations (samples * outputs,); None if diverged."""
     values = {
         one.name: one.value(float(point.shared[k]))
         for k, one in enumerate(model.candidate.free_parameters)

@@ -23,37 +23,32 @@ FORCE_UNITS = ("N*m", "N")
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """A manoeuvre as a sampled recording; only its first measurements are known,
-    as initial state.
-    """
+    """A manoeuvre as a sampled recording; measured are only the initial outputs."""
 
     name: str
     series: SampledRecording = field(repr=False)
 
 
 def manoeuvres_for(model_set: ModelSet) -> list[Manoeuvre]:
-    """Return the manoeuvres for the driving input of a model set, in the order of the file.
+    """Return the manoeuvres of `manoeuvres.yaml` for the driving input of a model set.
 
-    The file is `manoeuvres.yaml`. The driving input is the first varying force or torque with both
-    signs in the recordings, or the first varying one if none has; the brake is the first other
-    varying one. Manoeuvres with a brake are left out without one. The result is empty if no force
-    or torque varies. Amplitudes are scaled to the largest recorded magnitude of an input.
+    This is the first varying force or torque, if possible with both signs; the brake is the next
+    varying one. Amplitudes are scaled to the largest recorded magnitude of an input.
     """
-    forces = [name for name in model_set.automaton.inputs if _is_force(model_set, name)]
-    names = list(model_set.automaton.inputs)
     whole = np.concatenate([one.inputs for one in model_set.series])
-    moved = [name for name in forces if float(np.std(whole[:, names.index(name)])) > 0.0]
+    recorded = dict(zip(model_set.automaton.inputs, whole.T, strict=True))
+    forces = [name for name in recorded if _is_force(model_set, name)]
+    moved = [name for name in forces if float(np.std(recorded[name])) > 0.0]
     if not moved:
         return []
-    both = [name for name in moved if _has_both_signs(whole[:, names.index(name)])]
+    both = [name for name in moved if np.min(recorded[name]) < 0.0 < np.max(recorded[name])]
     drive = (both or moved)[0]
     brake = next((name for name in moved if name != drive), None)
-    found = []
-    for name, course in _read_manoeuvres().items():
-        if "brake" in course and brake is None:
-            continue
-        found.append(Manoeuvre(name, _manoeuvre_series(model_set, name, course, drive, brake)))
-    return found
+    return [
+        Manoeuvre(name, _manoeuvre_series(model_set, name, course, drive, brake))
+        for name, course in _read_manoeuvres().items()
+        if brake is not None or "brake" not in course
+    ]
 
 
 @cache
@@ -68,11 +63,6 @@ def _is_force(model_set: ModelSet, name: str) -> bool:
     """Return whether an input is a force or a torque."""
     kind = TreeTypes(model_set.document.root).type_of_name(name)
     return isinstance(kind, Dimension) and str(kind) in FORCE_UNITS
-
-
-def _has_both_signs(values: Reals) -> bool:
-    """Return whether values are both negative and positive."""
-    return bool(np.min(values) < 0.0 < np.max(values))
 
 
 def _manoeuvre_series(
@@ -121,9 +111,7 @@ def _chirp(time: Reals, sweep: Sequence[float] | None) -> Reals:
 
 
 def _initial_outputs(model_set: ModelSet, part: float) -> Reals:
-    """Return recorded outputs at a sample where the
-    first one is nearest to a part of its largest.
-    """
+    """Return the recorded outputs whose first is nearest to a part of its largest."""
     rows = np.concatenate([one.measured for one in model_set.series])
     rows = rows[np.all(np.isfinite(rows), axis=1)]
     target = part * float(np.max(np.abs(rows[:, 0])))

@@ -1,10 +1,8 @@
-"""Cause attribution: the input or body that causes a disturbance in a balance, from its time
-course.
+"""Cause attribution: the input or body that causes a disturbance in a balance.
 
 A disturbance that correlates with the acceleration belongs to a mass. One that is periodic in the
-angle belongs to an input: machines and discs have ripple, losses do not. A constant that depends
-neither on the speed, nor its sign, nor the recording belongs to an input as well: friction changes
-with the sign, and a road load differs between recordings.
+angle belongs to an input: machines have ripple, losses do not. So does a constant: friction changes
+with the sign of the speed, and a road load differs between recordings.
 """
 
 from __future__ import annotations
@@ -34,37 +32,30 @@ CONSTANT_MARGIN = 0.3
 """Fraction that the constant must explain beyond the line: a line through zero is friction."""
 
 INACTIVE_AMPLITUDE, INACTIVE_ENERGY = 0.02, 0.5
-"""Fraction of its largest magnitude below which an input is inactive, and the fraction of the
-squares of a disturbance that counts as most of it.
+"""Fraction of an input's largest magnitude that is inactive, and of squares that is most of them.
 """
 
 
 def attribute_causes(model_set: ModelSet, location: Location) -> Iterator[str]:
     """Yield the paths of inputs or elements of a location's balance that fit its disturbance.
 
-    All elements (`elements.name`) of the balance follow for a large disturbance that correlates
-    with the acceleration; else, for a constant, the inputs (`inputs.name`) that take both signs;
-    else, for a ripple (an order of the angle as strongest correlate), all inputs; else nothing. The
-    limits are `MASS_CORRELATION`, `MASS_FRACTION`, `CONSTANT_FRACTION`, `CONSTANT_MARGIN` and
-    `RIPPLE_CORRELATION`. The order is that of the automaton.
+    They are the elements for a large disturbance that follows the acceleration, else the inputs
+    with both signs for a constant, else all inputs for a ripple.
     """
     paths = [f"inputs.{name}" for name in model_set.automaton.inputs]
+    strongest, part = location.correlates[0] if location.correlates else ("", 0.0)
+    is_ripple = strongest in order_features(location.place) and part > RIPPLE_CORRELATION
     if _follows_acceleration(model_set, location):
         paths = [f"elements.{name}" for name in model_set.automaton.elements]
     elif _is_constant(location):
         paths = [path for path in paths if _has_both_signs(model_set, path)]
-    elif not _is_ripple(location):
+    elif not is_ripple:
         paths = []
     yield from (path for path in paths if balance_of(model_set, *path.split(".")) == location.path)
 
 
 def is_inactive(model_set: ModelSet, location: Location, path: str) -> bool:
-    """Return whether an input is near 0 during most of a disturbance, so it cannot be its cause.
-
-    Near 0 is below `INACTIVE_AMPLITUDE` (2 %) of its largest magnitude, and most is more than
-    `INACTIVE_ENERGY` (half) of the squares of the disturbance. `path` is `section.name`; the result
-    is False for other sections than `inputs` and for a location without smoothed disturbances.
-    """
+    """Return whether an input is below `INACTIVE_AMPLITUDE` during most of a disturbance."""
     section, _, name = path.partition(".")
     if section != "inputs" or not location.disturbances:
         return False
@@ -75,17 +66,12 @@ def is_inactive(model_set: ModelSet, location: Location, path: str) -> bool:
     ]
     size = np.abs(np.concatenate(input_values))
     squares = _stacked_disturbance(location) ** 2
-    return float(np.sum(squares[size < INACTIVE_AMPLITUDE * size.max()])) > INACTIVE_ENERGY * float(
-        np.sum(squares)
-    )
+    inactive = float(np.sum(squares[size < INACTIVE_AMPLITUDE * size.max()]))
+    return inactive > INACTIVE_ENERGY * float(np.sum(squares))
 
 
 def balance_of(model_set: ModelSet, section: str, place: str) -> str:
-    """Return `flow.state` of the balance in which an input or inertia acts, else `section.place`.
-
-    An element with a `speed` acts in the balance of that speed; an input in the first balance with
-    a disturbance whose equation names it. Other places are returned unchanged.
-    """
+    """Return `flow.state` of the balance in which an input or inertia acts, else the place."""
     element = model_set.automaton.elements.get(place)
     if section == "elements" and element is not None and "speed" in element.parts:
         return f"flow.{'.'.join(element.parts['speed'].reads)}"
@@ -94,12 +80,6 @@ def balance_of(model_set: ModelSet, section: str, place: str) -> str:
         if section == "inputs" and state in balances and place in names_in_text(scalar.text):
             return f"flow.{state}"
     return f"{section}.{place}"
-
-
-def _is_ripple(location: Location) -> bool:
-    """Return whether the strongest correlate is an order of the angle at the place."""
-    name, part = location.correlates[0] if location.correlates else ("", 0.0)
-    return name in order_features(location.place) and part > RIPPLE_CORRELATION
 
 
 def _follows_acceleration(model_set: ModelSet, location: Location) -> bool:
@@ -114,8 +94,7 @@ def _follows_acceleration(model_set: ModelSet, location: Location) -> bool:
 def _is_constant(location: Location) -> bool:
     """Return whether a disturbance is a constant rather than the sign of the speed.
 
-    A line over the speed is allowed beside it, because a fit may have changed the friction of the
-    base.
+    A line over the speed is allowed: a fit may have changed the friction of the base.
     """
     speeds = _balance_states(location)
     if not speeds:
@@ -135,19 +114,14 @@ def _is_constant(location: Location) -> bool:
 
 
 def _has_both_signs(model_set: ModelSet, path: str) -> bool:
-    """Return whether an input takes both signs;
-    a brake has one sign and cannot be constant at rest.
-    """
+    """Return whether an input takes both signs; a brake does not and is no constant at rest."""
     column = list(model_set.automaton.inputs).index(path.partition(".")[2])
     values = np.concatenate([one.inputs[:, column] for one in model_set.series])
     return bool(values.min() < 0.0 < values.max())
 
 
 def _balance_states(location: Location) -> list[Reals]:
-    """Return the state of a location's balance where its disturbance is known, for each recording.
-
-    The list is empty for other places and unknown disturbances.
-    """
+    """Return the state of the balance beside its disturbance, by recording; else empty."""
     if location.section != "flow" or location.free_model is None or not location.disturbances:
         return []
     column = location.free_model.candidate.predictor.states.index(location.place)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 
 import numpy as np
@@ -20,13 +21,10 @@ ORDERS = (1, 2, 3, 4, 6, 8, 12, 24)
 def find_correlates(
     model_set: ModelSet, free_model: Estimate, disturbances: Sequence[Reals]
 ) -> tuple[tuple[str, float], ...]:
-    """Return the features with the strongest correlation with a disturbance, and the correlations.
+    """Return the `MAX_CORRELATES` (3) features of largest correlation with a disturbance.
 
-    At most `MAX_CORRELATES` (3) are returned, in descending order of their magnitude. Features are
-    states with a range (also their sign and square), inputs (also their magnitude and rate), the
-    time, the recording, and orders of angles. For an order, whose phase differs between recordings,
-    the value is the multiple correlation with its sine and cosine. Constant features are left out.
-    A disturbance is compared with the last samples of each recording.
+    They are states with a range (also sign and square), inputs (also magnitude and rate), time,
+    recording, and orders of angles, whose phase may differ between recordings.
     """
     target = [values - np.mean(values) for values in disturbances]
     correlations = []
@@ -35,23 +33,16 @@ def find_correlates(
         target_values = np.concatenate(disturbances)
         if np.std(values) > 0.0 and np.std(target_values) > 0.0:
             correlations.append((name, float(np.corrcoef(values, target_values)[0, 1])))
-    correlations.append(
-        ("the recording (not the same in each)", _recording_correlation(disturbances))
-    )
-    angles = _order_angles(model_set, free_model).items()
-    correlations += [
-        (name, _order_correlation(target, _known_parts(each, disturbances)))
-        for name, each in angles
-    ]
+    recording = "the recording (not the same in each)"
+    correlations.append((recording, _recording_correlation(disturbances)))
+    for name, each in _order_angles(model_set, free_model).items():
+        correlations.append((name, _order_correlation(target, _known_parts(each, disturbances))))
     correlations = [(name, value) for name, value in correlations if np.isfinite(value)]
     return tuple(sorted(correlations, key=lambda pair: -abs(pair[1]))[:MAX_CORRELATES])
 
 
 def order_features(rate: str) -> dict[str, int]:
-    """Return the names of features that are orders of the angle of a rate, with their orders.
-
-    A name is `order 3 of the angle of <rate>`; the orders (periods per turn) are `ORDERS`.
-    """
+    """Return names `order 3 of the angle of <rate>` with their orders, `ORDERS` periods a turn."""
     return {f"order {order} of the angle of {rate}": order for order in ORDERS}
 
 
@@ -62,12 +53,8 @@ def _known_parts(parts: Sequence[Reals], disturbances: Sequence[Reals]) -> list[
 
 
 def _features(model_set: ModelSet, free_model: Estimate) -> dict[str, list[Reals]]:
-    """Return the features of states and inputs by name, one array (samples,) for each recording.
-
-    These are states with a range with sign and square, inputs with magnitude and rate, and the
-    time.
-    """
-    columns: dict[str, list[Reals]] = {}
+    """Return the features of states, inputs and time by name, (samples,) for each recording."""
+    columns: dict[str, list[Reals]] = defaultdict(list)
     states = free_model.candidate.predictor.states
     for one, prediction in zip(model_set.series, free_model.prediction.predictions, strict=True):
         rows, period = prediction.states[: prediction.completed], float(one.period)
@@ -75,33 +62,24 @@ def _features(model_set: ModelSet, free_model: Estimate) -> dict[str, list[Reals
             if state.range and name in states:
                 x = rows[:, states.index(name)]
                 scale = float(np.std(x)) or 1.0
-                sign: Reals = np.tanh(10.0 * x / scale)
-                columns.setdefault(f"the sign of {name}", []).append(sign)
-                columns.setdefault(f"the square of {name}", []).append(x * np.abs(x))
-                columns.setdefault(name, []).append(x)
+                columns[f"the sign of {name}"].append(np.tanh(10.0 * x / scale))
+                columns[f"the square of {name}"].append(x * np.abs(x))
+                columns[name].append(x)
         for k, name in enumerate(model_set.automaton.inputs):
             u = one.inputs[: prediction.completed, k]
-            columns.setdefault(name, []).append(u)
-            columns.setdefault(f"the amount of {name}", []).append(np.abs(u))
-            rate: Reals = np.asarray(np.gradient(u), dtype=np.float64) / period
-            columns.setdefault(f"the rate of {name}", []).append(rate)
-        columns.setdefault("time", []).append(
-            np.arange(prediction.completed, dtype=np.float64) * period
-        )
+            columns[name].append(u)
+            columns[f"the amount of {name}"].append(np.abs(u))
+            columns[f"the rate of {name}"].append(np.gradient(u) / period)
+        columns["time"].append(np.arange(prediction.completed, dtype=np.float64) * period)
     return columns
 
 
 def _order_angles(model_set: ModelSet, free_model: Estimate) -> dict[str, list[Reals]]:
-    """Return the angle times the order by name of the feature, one array for each recording.
-
-    The rates of the angles are declared by places and elements.
-    """
-    states = free_model.candidate.predictor.states
-    rates = [rate for rate in angle_rates(model_set) if rate in states]
+    """Return the angle times the order by name of the feature, (samples,) by recording."""
+    states, period = free_model.candidate.predictor.states, float(model_set.period)
     found = {}
-    for rate in rates:
+    for rate in (rate for rate in angle_rates(model_set) if rate in states):
         column = states.index(rate)
-        period = float(model_set.period)
         angles = [
             np.cumsum(one.states[: one.completed, column]) * period
             for one in free_model.prediction.predictions
@@ -112,10 +90,7 @@ def _order_angles(model_set: ModelSet, free_model: Estimate) -> dict[str, list[R
 
 
 def angle_rates(model_set: ModelSet) -> list[str]:
-    """Return the names under the key `angle_rate` in `places` and `elements` of a document.
-
-    Places come first, in the order of the document; a repeated name is dropped.
-    """
+    """Return the distinct `angle_rate` of `places`, then of `elements` of the document."""
     rates = []
     for section in ("places", "elements"):
         node = model_set.document.root.get(section)
@@ -127,9 +102,7 @@ def angle_rates(model_set: ModelSet) -> list[str]:
 
 
 def _order_correlation(target: Sequence[Reals], angles: Sequence[Reals]) -> float:
-    """Return the multiple correlation with the sine and cosine of angles,
-    fitted for each recording.
-    """
+    """Return the multiple correlation with sine and cosine, fitted by recording."""
     whole, explained = 0.0, 0.0
     for values, angle in zip(target, angles, strict=True):
         waves = np.stack([np.sin(angle), np.cos(angle)], axis=1)
@@ -141,9 +114,7 @@ def _order_correlation(target: Sequence[Reals], angles: Sequence[Reals]) -> floa
 
 
 def _recording_correlation(disturbances: Sequence[Reals]) -> float:
-    """Return the correlation of a disturbance with its mean in each recording;
-    0 for one recording.
-    """
+    """Return the correlation with the means of recordings; 0 for one recording."""
     if len(disturbances) < 2:
         return 0.0
     means = np.concatenate([np.full(len(values), np.mean(values)) for values in disturbances])

@@ -1,7 +1,4 @@
-"""Disturbance state fit: a fit of the base with a large process-noise level at one place.
-
-The other disturbances stay small.
-"""
+"""Disturbance state fit: a fit of the base with a large process-noise level at one place only."""
 
 from __future__ import annotations
 
@@ -21,9 +18,7 @@ from diagnosis.model.placed_effect import DISTURBANCE_STATE, PlacedEffect
 
 INITIAL_LEVEL = 10.0
 WIDE_LEVELS = (1.0, 100.0, 1000.0)
-"""Levels that are tried before the parameters are fitted:
-a sensor error can be 100 times its noise.
-"""
+"""Levels tried before the parameters are fitted: a sensor error can be 100 times its noise."""
 NEAR_LEVELS = (3.0, 30.0, 300.0)
 """Levels that are tried after the parameters are fitted."""
 ALL_LEVELS = tuple(sorted((INITIAL_LEVEL, *WIDE_LEVELS, *NEAR_LEVELS)))
@@ -36,21 +31,14 @@ def free_disturbance(
 ) -> Estimate:
     """Return the model with the disturbance of `placed_effect` free and its parameters fitted.
 
-    It has the effects of the base; a disturbance that the model set lacks is added. The other
-    disturbances stay at `ORDINARY_LEVEL` (0.1 units), with None all of them; the free level is the
-    best of `WIDE_LEVELS` and `INITIAL_LEVEL`, then of `NEAR_LEVELS`. The fit starts from the better
-    one of the parameters of the base and the declared ones, because the fit of a deficient base may
-    be far off, and takes at most `MAX_ITERATIONS` (3) steps. It is stored in the fit cache. The
-    cost is infinite if the model diverges.
+    Other disturbances (with None all) stay at `ORDINARY_LEVEL`; the level is the best of
+    `WIDE_LEVELS` and `INITIAL_LEVEL`, then of `NEAR_LEVELS`. The fit starts from the better of base
+    and declared parameters, takes at most `MAX_ITERATIONS` (3) steps and is cached. The cost is
+    infinite if it diverges.
     """
-    known = placed_effect is None or any(
-        placed_effect.id == other.id for other in model_set.disturbances
-    )
-    drifts = (
-        model_set.disturbances
-        if known or placed_effect is None
-        else (*model_set.disturbances, placed_effect)
-    )
+    drifts = model_set.disturbances
+    if placed_effect is not None and placed_effect.id not in {one.id for one in drifts}:
+        drifts = (*drifts, placed_effect)
     candidate = model_set.compile_candidate(base.candidate.placed_effects, drifts)
     fit = partial(_fit_free_disturbance, model_set, base, candidate, placed_effect)
     dependencies = [base.point, base.noise_levels, placed_effect and placed_effect.id]
@@ -83,19 +71,14 @@ def scan_level(
     name: str | None,
     levels: Sequence[float],
 ) -> Estimate:
-    """Return the estimate with the best level of one disturbance among `levels`, parameters fixed.
-
-    `levels` are in units of the disturbance. The given estimate is one of the choices and stays at
-    equal cost; it is returned for `name` None.
-    """
+    """Return the estimate with the best level [units] of one disturbance, parameters fixed."""
     if name is None:
         return estimate
     best = estimate
     for level in levels:
         noise_levels = with_disturbance_levels(estimate.noise_levels, units, {name: level})
-        tried = evaluate(
-            estimate.candidate, series, noise_levels, estimate.point, estimate.prediction
-        )
+        point, near = estimate.point, estimate.prediction
+        tried = evaluate(estimate.candidate, series, noise_levels, point, near)
         best = tried if tried.cost < best.cost else best
     return best
 
@@ -103,9 +86,6 @@ def scan_level(
 def with_disturbance_levels(
     noise_levels: NoiseLevels, units: Mapping[str, float], levels: Mapping[str, float]
 ) -> NoiseLevels:
-    """Return noise levels with the disturbances in `levels` set to their level times their unit.
-
-    All others stay. KeyError for a name without a unit.
-    """
+    """Return noise levels in which `levels` are multiples of `units`; others stay."""
     sizes = {name: level * units[name] for name, level in levels.items()}
     return dataclasses.replace(noise_levels, process={**noise_levels.process, **sizes})

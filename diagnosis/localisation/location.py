@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.data.stacked_recordings import burn_in_samples
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.model_set import ModelSet
-from diagnosis.estimation.place_magnitude import acting_rms
+from diagnosis.estimation.place_magnitude import acting_rms, rms
 from diagnosis.localisation.correlate import find_correlates
 from diagnosis.localisation.smoother import smooth_states
 from diagnosis.model.placed_effect import DISTURBANCE_STATE, PlacedEffect
@@ -28,10 +28,7 @@ MAX_WINDOWS = 12
 
 @dataclass(frozen=True)
 class DisturbanceEstimate:
-    """A torque, force or error in one recording after its burn-in, with standard deviations [SI].
-
-    `values` and `stds` have the shape (samples,).
-    """
+    """A disturbance after the burn-in of a recording with its deviations [SI], (samples,)."""
 
     values: Reals
     stds: Reals
@@ -44,14 +41,11 @@ class DisturbanceEstimate:
 
 @dataclass(frozen=True)
 class Location:
-    """A place with a free disturbance.
+    """A place with a free disturbance of size `rms` [SI]; `gain` [nats] is that of freeing it.
 
-    `gain` is its log-likelihood gain [nats], `rms` the size of the disturbance [SI] and `fraction`
-    that size relative to what acts there. `modes` gives the share of its squares in each mode,
-    `correlates` the quantities with which it correlates. `is_accepted` marks the place of an
-    accepted effect. `free_model` is the fit with this disturbance, whose state is
-    `disturbance_state`. For reported places the smoothed `disturbances` of each recording are
-    known, with their significant `windows` (start, end, recording).
+    `fraction` is the size relative to what acts there, `modes` the share of its squares in each
+    mode. `free_model` is the fit with `disturbance_state`. For reported places the smoothed
+    `disturbances` are known, with their significant `windows` (start, end, recording).
     """
 
     section: str
@@ -59,15 +53,13 @@ class Location:
     gain: float
     rms: float
     windows: tuple[tuple[float, float, str], ...] = ()
-    modes: dict[str, float] = dataclasses.field(default_factory=dict)
+    modes: dict[str, float] = field(default_factory=dict)
     correlates: tuple[tuple[str, float], ...] = ()
     fraction: float = 0.0
     is_accepted: bool = False
-    free_model: Estimate | None = dataclasses.field(default=None, repr=False, compare=False)
+    free_model: Estimate | None = field(default=None, repr=False, compare=False)
     disturbance_state: str = ""
-    disturbances: tuple[DisturbanceEstimate, ...] = dataclasses.field(
-        default=(), repr=False, compare=False
-    )
+    disturbances: tuple[DisturbanceEstimate, ...] = field(default=(), repr=False, compare=False)
 
     @property
     def path(self) -> str:
@@ -78,99 +70,66 @@ class Location:
 def location_of(
     model_set: ModelSet, section: str, placed_effect: PlacedEffect, free_model: Estimate
 ) -> Location:
-    """Return the location of a fit with a free disturbance, from filtered (not smoothed) values.
-
-    The gain is 0 until it is set; windows and `disturbances` are empty.
-    """
-    drifts = disturbances_of(
-        model_set.series, free_model, placed_effect.qualified_name(DISTURBANCE_STATE)
+    """Return the location of a fit from filtered values, with gain 0 and without windows."""
+    state = placed_effect.qualified_name(DISTURBANCE_STATE)
+    column = free_model.candidate.predictor.states.index(state)
+    runs = zip(model_set.series, free_model.prediction.predictions, strict=True)
+    drifts = [run.states[burn_in_samples(one) : run.completed, column] for one, run in runs]
+    location = Location(
+        section, placed_effect.place, 0.0, 0.0, free_model=free_model, disturbance_state=state
     )
-    size = _rms(drifts)
-    return Location(
-        section,
-        placed_effect.place,
-        0.0,
-        size,
-        modes=_mode_shares(model_set, drifts, free_model),
-        correlates=find_correlates(model_set, free_model, drifts),
-        fraction=_relative_size(model_set, section, placed_effect.place, free_model, size),
-        free_model=free_model,
-        disturbance_state=placed_effect.qualified_name(DISTURBANCE_STATE),
-    )
+    return _with_values(model_set, location, free_model, drifts)
 
 
 def with_smoothed_disturbances(model_set: ModelSet, location: Location) -> Location:
-    """Return a location with the smoothed disturbance over time and the values that follow from it.
+    """Return a location with its smoothed disturbance, if it is free and not smoothed yet.
 
-    These are those of `with_disturbances`. A location without a free model, or with known
-    disturbances, is returned unchanged. Raises ValueError if the model is unstable in every mode.
+    Raises ValueError if the model is unstable in every mode.
     """
     if location.free_model is None or location.disturbances:
         return location
     column = location.free_model.candidate.predictor.states.index(location.disturbance_state)
-    unknown = tuple(
-        DisturbanceEstimate(
-            run.states[burn_in_samples(one) :, column], run.stds[burn_in_samples(one) :, column]
-        )
-        for one, run in zip(
-            model_set.series, smooth_states(location.free_model, model_set.series), strict=True
-        )
-    )
-    return with_disturbances(model_set, location, unknown)
+    unknown = []
+    smoothed = smooth_states(location.free_model, model_set.series)
+    for one, run in zip(model_set.series, smoothed, strict=True):
+        known = slice(burn_in_samples(one), None), column
+        unknown.append(DisturbanceEstimate(run.states[known], run.stds[known]))
+    return with_disturbances(model_set, location, tuple(unknown))
 
 
 def with_disturbances(
     model_set: ModelSet, location: Location, disturbances: tuple[DisturbanceEstimate, ...]
 ) -> Location:
-    """Return a location with a disturbance over time, and the values that follow from it.
+    """Return a location with a disturbance over time, and rms, windows and others that follow.
 
-    These are rms, fraction, windows, modes and correlates. The windows are the longest ones first,
-    at most `MAX_WINDOWS` (12): samples beyond `SIGNIFICANT_STDS` nearer than `WINDOW_DISTANCE`
-    (0.2 s) are merged, and windows shorter than half of it are dropped. The location must have a
-    free model.
+    Significant samples nearer than `WINDOW_DISTANCE` are one window; those shorter than half of it
+    are dropped.
     """
-    assert location.free_model is not None
+    free_model = location.free_model
+    assert free_model is not None
     values = [one.values for one in disturbances]
     pairs = zip(model_set.series, disturbances, strict=True)
     windows = [window for one, known in pairs for window in _significant_windows(known, one)]
     windows.sort(key=lambda window: window[0] - window[1])
-    size = _rms(values)
+    location = dataclasses.replace(
+        location, windows=tuple(windows[:MAX_WINDOWS]), disturbances=disturbances
+    )
+    return _with_values(model_set, location, free_model, values)
+
+
+def _with_values(
+    model_set: ModelSet, location: Location, free_model: Estimate, values: Sequence[Reals]
+) -> Location:
+    """Return a location with size, modes and correlates of a disturbance [SI], (samples,) each."""
+    size = rms(np.concatenate(values))
+    scale = acting_rms(model_set, location.section, location.place, free_model)
     return dataclasses.replace(
         location,
         rms=size,
-        windows=tuple(windows[:MAX_WINDOWS]),
-        modes=_mode_shares(model_set, values, location.free_model),
-        correlates=find_correlates(model_set, location.free_model, values),
-        fraction=_relative_size(
-            model_set, location.section, location.place, location.free_model, size
-        ),
-        disturbances=disturbances,
+        modes=_mode_shares(model_set, values, free_model),
+        correlates=find_correlates(model_set, free_model, values),
+        fraction=size / scale if scale > 0.0 else 0.0,
     )
-
-
-def _relative_size(
-    model_set: ModelSet, section: str, place: str, free_model: Estimate, size: float
-) -> float:
-    """Return the size of a disturbance relative to what acts at its place; 0 if that is unknown."""
-    scale = acting_rms(model_set, section, place, free_model)
-    return size / scale if scale > 0.0 else 0.0
-
-
-def _rms(values: Sequence[Reals]) -> float:
-    """Return the root mean square over all recordings."""
-    return float(np.sqrt(np.mean(np.concatenate(values) ** 2)))
-
-
-def disturbances_of(
-    series: Sequence[SampledRecording], free_model: Estimate, name: str
-) -> list[Reals]:
-    """Return the filtered disturbance state `name` [SI] in each recording, (samples,) each.
-
-    The burn-in and the samples after a run diverged are left out.
-    """
-    place = free_model.candidate.predictor.states.index(name)
-    runs = zip(series, free_model.prediction.predictions, strict=True)
-    return [run.states[burn_in_samples(one) : run.completed, place] for one, run in runs]
 
 
 def _significant_windows(

@@ -27,13 +27,7 @@ MIN_CORRELATION = 0.3
 
 
 def format_location(locations: Sequence[Location], model_set: ModelSet) -> str:
-    """Return one sentence on the first location, or `NO_LOCATION` if it has no gain.
-
-    It is `missing in the balance of w: 1.2 N*m rms (30 % of what accelerates it), ...`, followed by
-    the share of the main mode (if there are several), the two longest windows, and the strongest
-    correlate from `MIN_CORRELATION` (0.3) on. An accepted location is described even without a
-    gain.
-    """
+    """Return size, main mode, windows and correlate of the first location, or `NO_LOCATION`."""
     best = locations[0] if locations else None
     if best is None or not (best.gain > 0.0 or best.is_accepted):
         return NO_LOCATION
@@ -41,20 +35,15 @@ def format_location(locations: Sequence[Location], model_set: ModelSet) -> str:
     unit = disturbance_unit(model_set, section, place)
     size = f"{best.rms:.3g} {unit}".strip() + " rms"
     if best.fraction > 0.0:
-        size += f" ({_format_percent(best.fraction)} {SCALE_PHRASES[section]})"
+        percent = 100.0 * best.fraction
+        size += f" ({percent:.2g} %" if percent < 100.0 else f" ({percent:.0f} %"
+        size += f" {SCALE_PHRASES[section]})"
     parts = [size, *_format_windows(best), *_format_correlates(best)]
     return f"missing {PLACE_PHRASES[best.section]} {best.place}: {', '.join(parts)}"
 
 
-def _format_percent(part: float) -> str:
-    """Return a fraction in per cent, with two digits below 100 %."""
-    return f"{100.0 * part:.2g} %" if part < 1.0 else f"{100.0 * part:.0f} %"
-
-
 def _format_windows(location: Location) -> list[str]:
-    """Return the share of the main mode (if there are several) and the longest windows,
-    as phrases.
-    """
+    """Return the share of the main of several modes, and the longest windows, as phrases."""
     found = []
     mode = max(location.modes, key=lambda name: location.modes[name], default="")
     if len(location.modes) > 1:

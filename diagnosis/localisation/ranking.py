@@ -22,46 +22,40 @@ from language.text.document import MappingNode
 
 
 def localise(model_set: ModelSet, base: Estimate) -> tuple[Location, ...]:
-    """Return the locations with a finite cost by descending gain, the first one smoothed over time.
+    """Return the locations with a finite cost by descending gain, the first one smoothed.
 
-    They are those of `disturbance_locations`, each with its disturbance alone free. The gain is
-    relative to a fit with all disturbances small (if that diverges, to the largest finite cost),
-    and may be negative. The parameters are fitted anew at each place, because those of the base are
-    biased by what it lacks.
+    The gain is relative to a fit with all disturbances small, or else to the largest finite cost.
+    Parameters are fitted anew at each place: those of the base are biased by what it lacks.
     """
     free = [
         (section, placed_effect, free_disturbance(model_set, base, placed_effect))
         for section, placed_effect in disturbance_locations(model_set, base)
     ]
     restricted_cost = free_disturbance(model_set, base).cost
-    finite_costs = [one.cost for *_, one in free if np.isfinite(one.cost)]
-    restricted_cost = (
-        restricted_cost if np.isfinite(restricted_cost) else max(finite_costs, default=0.0)
-    )
+    finite = [found for found in free if np.isfinite(found[-1].cost)]
+    if not np.isfinite(restricted_cost):
+        restricted_cost = max((one.cost for *_, one in finite), default=0.0)
     ranked = []
-    for section, placed_effect, one in free:
-        if np.isfinite(one.cost):
-            location = location_of(model_set, section, placed_effect, one)
-            ranked.append(dataclasses.replace(location, gain=restricted_cost - one.cost))
+    for section, placed_effect, one in finite:
+        location = location_of(model_set, section, placed_effect, one)
+        ranked.append(dataclasses.replace(location, gain=restricted_cost - one.cost))
     ranked.sort(key=lambda location: -location.gain)
     return tuple([with_smoothed_disturbances(model_set, ranked[0]), *ranked[1:]] if ranked else [])
 
 
 def disturbance_locations(model_set: ModelSet, base: Estimate) -> list[tuple[str, PlacedEffect]]:
-    """Return section and disturbance of each place where a disturbance is tried beside a base.
+    """Return section and disturbance of each place where one is tried beside a base.
 
-    These are the balances that have one in the model set ("flow"), then the elastic elements
-    ("elements"), then the compared outputs ("outputs"). A place at which the effects of the base
-    leave no room for a disturbance, such as an output with a delay, is left out.
+    These are balances, elastic elements and compared outputs. A place at which effects leave no
+    room for a disturbance, such as an output with a delay, is left out.
     """
     locations = [("flow", placed_effect) for placed_effect in model_set.disturbances]
     elements = model_set.document.root.get("elements")
     for entry in elements if isinstance(elements, MappingNode) else ():
         if model_set.automaton.elements[entry.key].kind == "elastic":
             locations.append(("elements", disturbance_effect("element", entry.key)))
-    locations += [
-        ("outputs", disturbance_effect("output", name)) for name in model_set.output_names
-    ]
+    for name in model_set.output_names:
+        locations.append(("outputs", disturbance_effect("output", name)))
     locations = [(section, model_set.scale_disturbance(one)) for section, one in locations]
     effects = base.candidate.placed_effects
     return [
@@ -87,9 +81,7 @@ def rank_accepted_first(
 ) -> tuple[Location, ...]:
     """Return locations with those of accepted effects (`paths`) first, in the order of the paths.
 
-    An accepted path takes over the location with its own path or with that of its balance, under
-    its own section and name, marked as accepted; without one it is new, with gain 0. The very first
-    one is smoothed. The other locations follow in their order, without those of `paths`.
+    A path takes over the location with its own path or that of its balance, else it is new.
     """
     by_path = {location.path: location for location in locations}
     first: list[Location] = []
@@ -108,9 +100,7 @@ def rank_causes_first(
     """Return locations of an unknown cause, led by an input or element of the first balance.
 
     The cause is the first path of `attribute_causes`, else the first of `nearest_paths` (best
-    effects first) that acts in that balance and is not inactive. A copy of the first location under
-    the path of the cause is put before all locations. Without a cause, or if it is the balance
-    itself, the locations stay as they are.
+    effects first) that acts in that balance and is not inactive.
     """
     if not locations:
         return ()

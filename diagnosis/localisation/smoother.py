@@ -34,10 +34,9 @@ class SmoothedStates:
 class SmootherInput:
     """The data of recordings that are smoothed in parallel; a recording that has ended is NaN.
 
-    `innovations` (samples, recordings, outputs) of the observer are NaN where unknown, and
-    `corrections` (samples, recordings, states) are its updates of the states. `phi` and `q`
-    (samples, recordings, states, states) lead to the next sample; `c` has the shape (samples,
-    recordings, outputs, states).
+    `innovations` (samples, recordings, outputs) are NaN where unknown; `corrections` (samples,
+    recordings, states) are the observer's updates. `phi` and `q` (samples, recordings, states,
+    states) lead to the next sample; `c` is (samples, recordings, outputs, states).
     """
 
     innovations: Reals
@@ -49,11 +48,7 @@ class SmootherInput:
 
 @dataclass(frozen=True)
 class _MeasurementUpdate:
-    """The update by one output at one sample; each array begins with the axis of recordings.
-
-    `output_row` is the row of the output matrix, `inverse_variance` the inverse of the innovation
-    variance (0 if unknown), `normalised_square` the squared innovation over its variance.
-    """
+    """The update by one output at one sample; each array begins with the axis of recordings."""
 
     output_row: Reals
     inverse_variance: Reals
@@ -65,10 +60,9 @@ class _MeasurementUpdate:
 def smooth_states(estimate: Estimate, series: Sequence[SampledRecording]) -> list[SmoothedStates]:
     """Return the smoothed states of each recording to which a model was fitted.
 
-    The standard deviations are multiplied by the root of the mean normalised square of innovations
-    over `AVERAGING_TIME` (5 reference times), where that exceeds 1. Samples after a run diverged
-    are left out.
-    Raises ValueError if the model is unstable in every mode.
+    The standard deviations are scaled by the mean normalised square of innovations over
+    `AVERAGING_TIME`, where that exceeds 1. Raises ValueError if the model is unstable in every
+    mode.
     """
     candidate, noise_levels = estimate.candidate, estimate.noise_levels
     locals_ = local_models(candidate, series, estimate.values(0), noise_levels, estimate.prediction)
@@ -79,14 +73,11 @@ def smooth_states(estimate: Estimate, series: Sequence[SampledRecording]) -> lis
     after, spread, ratios = smooth_deviations(steps, start, noise_levels.outputs**2)
     result = []
     for r, run in enumerate(estimate.prediction.predictions):
-        around = max(1, series[r].sample_count(AVERAGING_TIME))
-        scale = np.sqrt(np.maximum(_moving_mean(ratios[: run.completed, :, r], around), 1.0))
-        states = (
-            run.states[: run.completed]
-            - steps.corrections[: run.completed, r]
-            + after[: run.completed, r]
-        )
-        result.append(SmoothedStates(states, scale[:, None] * spread[: run.completed, r]))
+        rows = slice(run.completed)
+        around = series[r].sample_count(AVERAGING_TIME)
+        scale = np.sqrt(np.maximum(_moving_mean(ratios[rows, :, r], around), 1.0))
+        states = run.states[rows] - steps.corrections[rows, r] + after[rows, r]
+        result.append(SmoothedStates(states, scale[:, None] * spread[rows, r]))
     return result
 
 
@@ -100,52 +91,39 @@ def _smoother_input(estimate: Estimate, models: dict[int, LocalModel]) -> Smooth
     modes, default_model = list(predictor.modes), next(iter(models.values()))
     first, steady = estimate.gains.transient, estimate.gains.steady_state
     for r, run in enumerate(runs):
-        mode_indices = np.array([modes.index(int(mode)) for mode in run.modes[: run.completed]])
-        gains = steady[mode_indices]
+        rows = slice(run.completed)
+        places[rows, r] = [modes.index(int(mode)) for mode in run.modes[rows]]
+        gains = steady[places[rows, r]]
         gains[: len(first)] = first[: len(gains)]
-        innovations[: run.completed, r], places[: run.completed, r] = (
-            run.innovations[: run.completed],
-            mode_indices,
-        )
-        corrections[: run.completed, r] = np.einsum(
-            "kij,kj->ki", gains, np.nan_to_num(innovations[: run.completed, r])
-        )
-    models_by_mode = [models.get(mode, default_model) for mode in modes]
-    phi, c = (
-        np.array([getattr(one.linear, name) for one in models_by_mode])[places]
-        for name in ("phi", "c")
-    )
-    return SmootherInput(
-        innovations, corrections, phi, np.array([one.q for one in models_by_mode])[places], c
-    )
+        innovations[rows, r] = run.innovations[rows]
+        corrections[rows, r] = np.einsum("kij,kj->ki", gains, np.nan_to_num(innovations[rows, r]))
+    by_mode = [models.get(mode, default_model) for mode in modes]
+    phi = np.array([one.linear.phi for one in by_mode])[places]
+    c = np.array([one.linear.c for one in by_mode])[places]
+    q = np.array([one.q for one in by_mode])[places]
+    return SmootherInput(innovations, corrections, phi, q, c)
 
 
 def smooth_deviations(
     data: SmootherInput, initial_std: Reals, noise_variances: Reals
 ) -> tuple[Reals, Reals, Reals]:
-    """Return smoothed deviations from the run, their standard deviations, and normalised squares.
+    """Return smoothed deviations and standard deviations, (samples, recordings, states) each.
 
-    The first two have the shape (samples, recordings, states), the last one (samples, outputs,
-    recordings), NaN where an innovation is unknown. `initial_std` (states,) are the standard
-    deviations of the states at the start, `noise_variances` (outputs,) those of the measurements.
-    Deviations are from the run before the observer's own correction.
+    The third result are normalised squares (samples, outputs, recordings). `initial_std` (states,)
+    and `noise_variances` (outputs,) are those of start and measurements.
     """
     before, covariances, corrections = _forward_pass(data, initial_std, noise_variances)
     after, spread = _backward_pass(data, before, covariances, corrections)
-    return (
-        after,
-        spread,
-        np.array([[one.normalised_square for one in each] for each in corrections]),
-    )
+    squares = np.array([[one.normalised_square for one in each] for each in corrections])
+    return after, spread, squares
 
 
 def _forward_pass(
     data: SmootherInput, initial_std: Reals, noise_variances: Reals
 ) -> tuple[Reals, Reals, list[list[_MeasurementUpdate]]]:
-    """Return the deviations and covariances before each sample, and the measurement updates.
+    """Return deviations and covariances before each sample, and sequential Kalman updates.
 
-    Outputs are processed one after the other (sequential Kalman update); an unknown one has the
-    gain 0. The deviation is measured from the run before the observer's own correction.
+    The deviation is measured from the run before the observer's own correction.
     """
     samples, recordings, states = data.corrections.shape
     means, covariances = np.empty(data.corrections.shape), np.empty(data.phi.shape)
@@ -171,9 +149,7 @@ def _forward_pass(
 def _measurement_update(
     output_row: Reals, innovation: Reals, mean: Reals, p: Reals, variance: float
 ) -> _MeasurementUpdate:
-    """Return the Kalman update of one output,
-    with gain and weight 0 where the innovation is unknown.
-    """
+    """Return the Kalman update of one output, with gain 0 where it is unknown."""
     known = np.isfinite(innovation)
     across = _batch_matvec(p, output_row)
     whole = _batch_dot(output_row, across) + variance
@@ -189,10 +165,7 @@ def _backward_pass(
     covariances: Reals,
     corrections: list[list[_MeasurementUpdate]],
 ) -> tuple[Reals, Reals]:
-    """Return smoothed deviations and standard deviations, (samples, recordings, states) each.
-
-    The adjoint and its information matrix run backwards through the measurement updates.
-    """
+    """Return smoothed deviations and standard deviations, (samples, recordings, states) each."""
     samples, recordings, states = means.shape
     adjoint, information = np.zeros((recordings, states)), np.zeros((recordings, states, states))
     after, spread = np.empty(means.shape), np.empty(means.shape)

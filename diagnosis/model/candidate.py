@@ -20,6 +20,7 @@ from diagnosis.model.placed_effect import (
     DISTURBANCE_STATE,
     PlacedEffect,
     automaton_with_effects,
+    effect_names,
     lower_tunable_program,
     minimum_substeps,
 )
@@ -27,7 +28,6 @@ from language.expressions.syntax_tree import Name, names
 from language.lowering.delay_buffers import memory_calls_by_key
 from language.model.automaton import Automaton
 from language.model.declaration import Formula, Parameter
-from language.overlays.effect_reader import added_names
 from language.overlays.expand_document import Project
 from language.text.document import Document
 
@@ -80,54 +80,38 @@ class Candidate:
         return np.array(ranges, dtype=np.float64).reshape(-1, 2)
 
     def calibration_page(self, values: Mapping[str, float], series: SampledRecording) -> Reals:
-        """Return the calibration page (tunables,) for one recording.
-
-        It holds `values` [SI] by name, the defaults of other tunables, and the initial values of
-        compared states from the first measurements of the recording. Names that are no tunables are
-        ignored.
-        """
-        return np.asarray(
-            self.calibration_pages([values], series.first_measured[np.newaxis])[0], dtype=np.float64
-        )
+        """Return the calibration page (tunables,) of `values` [SI] for one recording."""
+        page: Reals = self.calibration_pages([values], series.first_measured[np.newaxis])[0]
+        return page
 
     def calibration_pages(
         self, values: Sequence[Mapping[str, float]], first_measured: Reals
     ) -> Reals:
-        """Return the calibration pages (recordings, tunables) of the values [SI] of recordings.
+        """Return the calibration pages (recordings, tunables) of values [SI] of recordings.
 
-        Other tunables have their defaults; names that are no tunables are ignored. `first_measured`
-        (recordings, outputs) gives the initial values of compared states; a NaN keeps the value of
-        the page. Values that are the same object for all recordings are converted once.
+        Other tunables have their defaults. `first_measured` (recordings, outputs) gives the initial
+        values of compared states; a NaN keeps the value of the page.
         """
         is_shared = all(own is values[0] for own in values)
-        rows = [
-            list({**self._default_page, **own}.values())
-            for own in (values[:1] if is_shared else values)
-        ]
-        width = len(self._default_page)
-        pages = np.array([row[:width] for row in rows])
+        defaults = self.predictor.page
+        pages = np.array(
+            [
+                list({**defaults, **own}.values())[: len(defaults)]
+                for own in (values[:1] if is_shared else values)
+            ]
+        )
         pages = np.repeat(pages, len(values), axis=0) if is_shared else pages
         columns, places = self._initial_value_columns
         initial_values = first_measured[:, columns]
-        known = np.isfinite(initial_values)
-        pages[:, places] = (
-            initial_values if known.all() else np.where(known, initial_values, pages[:, places])
-        )
+        pages[:, places] = np.where(np.isfinite(initial_values), initial_values, pages[:, places])
         return pages
-
-    @cached_property
-    def _default_page(self) -> dict[str, float]:
-        """The default value of each tunable by name, in the order of the page."""
-        return dict(self.predictor.page)
 
     @cached_property
     def _initial_value_columns(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """The indices of outputs that are states, and of their initial values in the page."""
         places = {name: place for place, name in enumerate(self.predictor.page)}
-        fresh = [
-            (k, INITIAL_VALUE_NAME.format(name)) for k, name in enumerate(self.predictor.outputs)
-        ]
-        known = [(k, places[name]) for k, name in fresh if name in places]
+        fresh = [INITIAL_VALUE_NAME.format(name) for name in self.predictor.outputs]
+        known = [(k, places[name]) for k, name in enumerate(fresh) if name in places]
         columns, starts = np.array(known, dtype=np.intp).reshape(-1, 2).T
         return columns, starts
 
@@ -140,18 +124,14 @@ def compile_candidate(
     output_names: Sequence[str],
     period: Fraction,
 ) -> Candidate:
-    """Return the base with placed effects and disturbances, compiled for a sample period [s].
+    """Return the base with effects and disturbances, compiled for a sample period [s].
 
-    A compiled model with the same sources is read from the compile cache, otherwise it is built and
-    stored there. The names that `placed_effects` add get the wide prior of effects; `disturbances`
-    add disturbance states. Initial values of states among `output_names` become tunable. Raises
-    SpecError, and MissingToolError or BuildError if no C compiler works.
+    Initial values of states among `output_names` become tunable. Raises SpecError, and
+    MissingToolError or BuildError if no C compiler works.
     """
     all_layers = [*placed_effects, *disturbances]
     parts = [
-        f"{placed_effect.id} {placed_effect.suffix} {placed_effect.scales} "
-        f"{node_text(placed_effect.effect.body)}"
-        for placed_effect in all_layers
+        f"{one.id} {one.suffix} {one.scales} {node_text(one.effect.body)}" for one in all_layers
     ]
     counts = f"{len(placed_effects)} effects, {len(disturbances)} disturbances"
     key = cache_key(node_text(document.root), counts, *parts, *output_names, str(period))
@@ -172,17 +152,11 @@ def _compile(
     period: Fraction,
 ) -> tuple[CompiledModel, bytes]:
     """Return the metadata and the shared library of an automaton with its effects, built now."""
-    effect_parameters = [
-        placed_effect.qualified_name(name)
-        for placed_effect in placed_effects
-        for name in added_names(placed_effect.effect.body)
-    ]
+    effect_parameters = [name for one in placed_effects for name in effect_names(one)]
     uncertain = free_parameters_of(automaton, effect_parameters)
     with_initial_values = _with_tunable_initial_values(automaton, output_names)
-    initial_value_names = [
-        name for name in with_initial_values.parameters if name not in automaton.parameters
-    ]
-    names = [*(one.name for one in uncertain), *initial_value_names]
+    added = [name for name in with_initial_values.parameters if name not in automaton.parameters]
+    names = [*(one.name for one in uncertain), *added]
     min_count = minimum_substeps(automaton, placed_effects, output_names, period)
     program, substeps = lower_tunable_program(
         with_initial_values, names, effect_parameters, period, min_count
@@ -194,10 +168,10 @@ def _compile(
         substeps,
         tuple(float(r[1] - r[0]) if r else 1.0 for r in ranges),
         uncertain,
-        tuple(placed_effect.qualified_name(DISTURBANCE_STATE) for placed_effect in disturbances),
+        tuple(one.qualified_name(DISTURBANCE_STATE) for one in disturbances),
         tuple(
-            float(automaton.parameters[placed_effect.qualified_name("memory")].value or 1)
-            for placed_effect in disturbances
+            float(automaton.parameters[one.qualified_name("memory")].value or 1)
+            for one in disturbances
         ),
         _delay_parameters(automaton),
         tuple(name in effect_parameters for name in columns.states),
@@ -214,7 +188,7 @@ def _delay_parameters(automaton: Automaton) -> tuple[str, ...]:
 
 
 def _with_tunable_initial_values(automaton: Automaton, output_names: Sequence[str]) -> Automaton:
-    """Return an automaton in which the initial value of each compared state is a new parameter.
+    """Return an automaton in which initial values of compared states are parameters.
 
     This includes outputs that an effect alters: the state still starts near the measured value.
     """

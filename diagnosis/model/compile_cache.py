@@ -1,7 +1,6 @@
 """Compile cache: metadata and shared libraries of compiled candidates, kept between runs.
 
-Placing effects, checking, lowering and compiling takes about a second, longer than a fit; studies
-use the same candidates for many cases.
+Compiling takes about a second, longer than a fit; studies repeat candidates.
 """
 
 from __future__ import annotations
@@ -12,12 +11,11 @@ import hashlib
 import json
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import codegen
@@ -47,10 +45,8 @@ COMPILATION_MODULES = (
 class CompiledModel:
     """Metadata of a compiled candidate without its library; it is stored as JSON.
 
-    `columns` describes the arrays of the predictor, `substeps` is the number of major steps in a
-    sample, and `state_ranges` (states,) are the widths of the ranges of states. The disturbance
-    states have the correlation times `memories` [s], and `delays` are the parameters that are delay
-    times. `is_effect_state` (states,) marks states that effects add.
+    `substeps` is the number of major steps in a sample, `state_ranges` (states,) are the widths of
+    ranges, `memories` [s] the correlation times of disturbances, `delays` the parameters of delays.
     """
 
     columns: PredictorColumns
@@ -64,12 +60,7 @@ class CompiledModel:
 
 
 def cache_key(*parts: str) -> str:
-    """Return the SHA-256 key (hex) of texts and of the code that compiles candidates.
-
-    The order of the texts counts; each one ends with a NUL byte, which no document contains. The
-    code is that of `language`, `codegen` and
-    `COMPILATION_MODULES`.
-    """
+    """Return the SHA-256 key (hex) of texts and of the code that compiles candidates."""
     digest = hashlib.sha256(code_digest(COMPILATION_MODULES).encode())
     for part in parts:
         digest.update(part.encode() + b"\0")
@@ -77,11 +68,7 @@ def cache_key(*parts: str) -> str:
 
 
 def node_text(node: YamlNode | None) -> str:
-    """Return a document tree as one line of text without positions; "" for None.
-
-    Scalars are JSON strings, sequences `[a,b]` and mappings `{"key":value}` in the order of the
-    document.
-    """
+    """Return a document tree as one line of JSON-like text without positions; "" for None."""
     if isinstance(node, ScalarNode):
         return json.dumps(node.text)
     if isinstance(node, SequenceNode):
@@ -94,12 +81,10 @@ def node_text(node: YamlNode | None) -> str:
 def load_or_compile(
     key: str, compile_model: Callable[[], tuple[CompiledModel, bytes]]
 ) -> tuple[CompiledModel, Path]:
-    """Return the metadata and the library path of a key, from the cache or compiled and stored now.
+    """Return the metadata and the library path of a key, from the cache or compiled now.
 
-    The files are `<key>.json` and `<key>.so` in the user's cache folder, or in a temporary folder
-    if there is none. An entry whose files are unreadable or whose library does not match its digest
-    is compiled again. Raises OSError if the files cannot be written, and what `compile_model`
-    raises.
+    An unreadable or changed entry is compiled again. Raises OSError if the files cannot be written,
+    and what `compile_model` raises.
     """
     folder = _cache_folder()
     recipe_path, library = folder / f"{key}.json", folder / f"{key}.so"
@@ -119,10 +104,7 @@ def load_or_compile(
 
 @cache
 def _cache_folder() -> Path:
-    """Return the user's cache folder of candidates, or a temporary folder if there is none.
-
-    The temporary folder is removed when the process ends.
-    """
+    """Return the cache folder of candidates, or a temporary one until the process ends."""
     folder = cache_subfolder("candidates")
     if folder is None:
         folder = Path(tempfile.mkdtemp(prefix="modewright-"))
@@ -132,49 +114,31 @@ def _cache_folder() -> Path:
 
 @cache
 def code_digest(patterns: tuple[str, ...] = ("*",)) -> str:
-    """Return the SHA-256 digest (hex) of the source files on which compiled models and fits depend.
+    """Return the SHA-256 digest (hex) of the sources on which compiled models and fits depend.
 
-    It covers all files (py, jinja, yaml, lark) of `language` and `codegen`, and the files of
-    `diagnosis` whose stem matches one of the glob `patterns` (all by default). It is computed once
-    per process.
+    It covers `language`, `codegen` and the files of `diagnosis` whose stem matches a pattern.
     """
-    digest = hashlib.sha256()
+    searched = [(language, "*"), (codegen, "*"), *((diagnosis, pattern) for pattern in patterns)]
     files = [
-        file for package in (language, codegen) for file in _source_files(_package_folder(package))
+        file
+        for package, pattern in searched
+        for ending in ("py", "jinja", "yaml", "lark")
+        for file in Path(str(package.__file__)).parent.glob(f"**/{pattern}.{ending}")
     ]
-    files += [file for name in patterns for file in _source_files(_package_folder(diagnosis), name)]
+    digest = hashlib.sha256()
     for path in sorted(files):
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
 
 
-def _package_folder(package: ModuleType) -> Path:
-    """Return the folder of a package."""
-    return Path(str(package.__file__)).parent
-
-
-def _source_files(folder: Path, name: str = "*") -> Iterator[Path]:
-    """Yield the source files below a folder (Python, templates, YAML,
-    grammars) with a stem like `name`.
-    """
-    for ending in ("py", "jinja", "yaml", "lark"):
-        yield from folder.glob(f"**/{name}.{ending}")
-
-
 def _from_json(data: dict[str, Any]) -> CompiledModel:
     """Return the metadata that a JSON object of the cache holds."""
-    given: dict[str, Any] = data["columns"]
-    columns: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
-    free_parameters = tuple(
-        FreeParameter(**{**one, "starts": tuple(one["starts"])}) for one in data["free_parameters"]
-    )
-    return CompiledModel(
-        PredictorColumns(**columns),
-        int(data["substeps"]),
-        tuple(data["state_ranges"]),
-        free_parameters,
-        tuple(data["disturbance_states"]),
-        tuple(data["memories"]),
-        tuple(data["delays"]),
-        tuple(data["is_effect_state"]),
-    )
+    free_parameters = tuple(FreeParameter(**_with_tuples(one)) for one in data["free_parameters"])
+    columns = PredictorColumns(**_with_tuples(data["columns"]))
+    given = {**_with_tuples(data), "columns": columns, "free_parameters": free_parameters}
+    return CompiledModel(**given)
+
+
+def _with_tuples(data: dict[str, Any]) -> dict[str, Any]:
+    """Return a JSON object with tuples in place of lists."""
+    return {key: tuple(one) if isinstance(one, list) else one for key, one in data.items()}

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
-from diagnosis.model.equation_change import EquationChange, equation_changes
-from diagnosis.model.placed_effect import PlacedEffect, automaton_with_effects, find_placements
+from diagnosis.model.placed_effect import (
+    PlacedEffect,
+    automaton_with_effects,
+    find_placements,
+    overlay_effects,
+    read_effects,
+)
 from language.overlays.effect_reader import DESCRIPTION_KEYS, Effect, PlacePattern, read_effect
 from language.overlays.expand_document import Project
 from language.overlays.name_types import format_si_unit
 from language.text.diagnostic import Problems, Source, Span, SpecError
 from language.text.document import Document, MappingNode
+from language.text.provenance import diff_specs
 
 HEADER_KEYS = ("language", "effect", "about", "at", *DESCRIPTION_KEYS)
 """Keys of an effect file that describe it; the other keys define its equations."""
@@ -19,10 +26,7 @@ HEADER_KEYS = ("language", "effect", "about", "at", *DESCRIPTION_KEYS)
 
 @dataclass(frozen=True)
 class EffectDescription:
-    """An effect with its defining lines and the places of a spec where it can be applied.
-
-    `changes` gives, by the name of each place, the lines of the spec that the effect changes there.
-    """
+    """An effect, its defining lines, its places in a spec and the `changes` at each of them."""
 
     effect: Effect
     lines: tuple[str, ...] = field(repr=False)
@@ -36,10 +40,7 @@ class EffectDescription:
 
 
 def library_effects(project: Project) -> tuple[Effect, ...]:
-    """Return the effects of a project and the shipped ones, sorted by name.
-
-    Raises SpecError with the problems of all files if one is invalid.
-    """
+    """Return all effects of a project by name; SpecError with the problems of all files."""
     span = Span(Source("effects"), 1, 1)
     problems = Problems()
     found = [
@@ -53,34 +54,16 @@ def library_effects(project: Project) -> tuple[Effect, ...]:
 def describe_effect(
     effect: Effect, document: Document | None = None, project: Project | None = None
 ) -> EffectDescription:
-    """Return the description of an effect, with its places if an expanded document is given.
-
-    Places at which the resulting automaton would be invalid are left out. Places and changes are
-    empty unless both `document` and `project` are given.
-    """
+    """Return the description of an effect, with its valid places in a given document."""
     if document is None or project is None:
         return EffectDescription(effect, _defining_lines(effect.body))
     fits = find_placements(document, effect)
-    placed_effects = tuple(
-        placed_effect for placed_effect in fits if _is_placeable(document, project, placed_effect)
-    )
+    placed_effects = tuple(one for one in fits if not _placement_error(one, document, project))
     altered = {
         placed_effect.place: tuple(equation_changes(document, [placed_effect]))
         for placed_effect in placed_effects
     }
     return EffectDescription(effect, _defining_lines(effect.body), placed_effects, altered)
-
-
-def _is_placeable(document: Document, project: Project, placed_effect: PlacedEffect) -> bool:
-    """Return whether the automaton with the effect at this place is valid.
-
-    A place can match by structure only: the balance of a sensor filter looks like one of a speed.
-    """
-    try:
-        automaton_with_effects(document, project, (placed_effect,))
-    except SpecError:
-        return False
-    return True
 
 
 def _defining_lines(body: MappingNode) -> tuple[str, ...]:
@@ -96,10 +79,7 @@ def _defining_lines(body: MappingNode) -> tuple[str, ...]:
 
 
 def format_place_kinds(effect: Effect) -> str:
-    """Return in words the kinds of place to which an effect applies, joined by ", or ".
-
-    An example is "the balance of a speed in N*m, or an elastic element that has gap".
-    """
+    """Return in words the kinds of place to which an effect applies, joined by ", or "."""
     return ", or ".join(_format_place_kind(fit) for fit in effect.place_patterns)
 
 
@@ -114,3 +94,81 @@ def _format_place_kind(fit: PlacePattern) -> str:
     unit = f" in {format_si_unit(fit.unit)}" if fit.unit else ""
     has = f" that has {', '.join(fit.has)}" if fit.has else ""
     return words + unit + has
+
+
+def load_effects(folder: Path) -> tuple[Effect, ...]:
+    """Return the effects of the `*.yaml` files directly in a folder, sorted by file name.
+
+    Raises ValueError without any, and SpecError for an invalid file or a name that is there twice.
+    """
+    effects = read_effects(folder)
+    if not effects:
+        raise ValueError(f"there is no effect in {folder}")
+    problems, first = Problems(), dict[str, Effect]()
+    for effect in effects:
+        previous = first.setdefault(effect.name, effect)
+        if previous is not effect:
+            label = f"effect `{effect.name}` is defined twice"
+            problems.error("name", effect.span, label, f"it is first at {previous.span}")
+    problems.raise_if_errors()
+    return effects
+
+
+def explain_unplaceable(
+    effects: Sequence[Effect], document: Document, project: Project
+) -> Iterator[str]:
+    """Yield why each effect cannot be placed, for those that are valid at no place."""
+    for effect in effects:
+        placed_effects = find_placements(document, effect)
+        errors = [_placement_error(one, document, project) for one in placed_effects]
+        if all(errors):
+            why = next(iter(errors), f"it fits no place of `{document.name}`")
+            yield f"effect `{effect.name}` is not tried: {why}"
+
+
+def _placement_error(placed_effect: PlacedEffect, document: Document, project: Project) -> str:
+    """Return why an effect at a place that matches makes the automaton invalid, or ""."""
+    try:
+        automaton_with_effects(document, project, [placed_effect])
+    except SpecError as error:
+        first = error.problems[0]
+        return f"at `{placed_effect.place}`: {first.span}: {first.label}"
+    return ""
+
+
+EQUATION_SECTIONS = (
+    "inputs",
+    "states",
+    "equations",
+    "flow",
+    "terms",
+    "modes",
+    "regions",
+    "outputs",
+)
+"""Sections of a spec that are compared; parameters have a table of their own."""
+
+
+@dataclass(frozen=True)
+class EquationChange:
+    """A line of the spec by its key path, before and after; empty text if the line is absent."""
+
+    path: str
+    before: str
+    after: str
+
+
+def equation_changes(
+    document: Document, placed_effects: Sequence[PlacedEffect]
+) -> list[EquationChange]:
+    """Return the lines of an expanded document that placed effects change, before and after.
+
+    Raises SpecError if the effects cannot be applied.
+    """
+    found = diff_specs(document.root, overlay_effects(document, placed_effects).root)
+    return [
+        EquationChange(one.path, one.old.value if one.old else "", one.new.value if one.new else "")
+        for one in found
+        if one.path.partition(".")[0] in EQUATION_SECTIONS
+        and not one.path.endswith((".unit", ".about", ".range", ".initial"))
+    ]

@@ -42,11 +42,7 @@ BLUE, RED, *_ = PALETTE
 
 @dataclass(frozen=True)
 class Signature:
-    """Simulations of a base without and with an effect.
-
-    `step` is the stepped input with its height, and `values` are the parameters of the effect as
-    text with units, by their names in the effect.
-    """
+    """Simulations of a base without and with an effect, its parameters as text and the step."""
 
     placed_effect: PlacedEffect
     step: str
@@ -63,12 +59,8 @@ def simulate_signature(
 ) -> Signature:
     """Return the simulations of an expanded base with and without an effect, over `HORIZON` (4 s).
 
-    `step` is an input and its height with unit; by default the input of the effect's place, or the
-    first input without a default, or the first one, by `DEFAULT_STEP_HEIGHTS`. The input steps to
-    the negative height at 1 s and back at 2.5 s; inputs without a default are 0. The magnitudes of
-    the place are those of the step and of the base. A parameter of the effect whose value is
-    neutral takes the last start value of a fit. Raises SpecError, and
-    ValueError if the base has no input or not that of `step`.
+    `step` is an input and its height with unit (`_default_step`). It steps to the negative height
+    at 1 s and back at 2.5 s. Raises SpecError, and ValueError if the base has no such input.
     """
     base = automaton_with_effects(document, project, ())
     name, height = step or _default_step(base, placed_effect)
@@ -106,17 +98,15 @@ def _place_scales(
 
 
 def _default_step(base: Automaton, placed_effect: PlacedEffect) -> tuple[str, str]:
-    """Return the input to step and its height: the place of the effect if that is an input, else
-    the first input without a default, else the first input. Raises ValueError without inputs.
+    """Return the input to step and its height; ValueError without inputs.
+
+    It is the place of the effect, else the first input without a default, else the first one.
     """
     if not base.inputs:
         raise ValueError(f"`{base.name}` has no input to step")
     free = [name for name, one in base.inputs.items() if one.default is None]
-    name = (
-        placed_effect.place
-        if placed_effect.place in base.inputs
-        else next(iter([*free, *base.inputs]))
-    )
+    is_input = placed_effect.place in base.inputs
+    name = placed_effect.place if is_input else [*free, *base.inputs][0]
     unit = format_si_unit(base.inputs[name].unit.dimension)
     return name, f"{DEFAULT_STEP_HEIGHTS.get(unit, '1')} {unit}"
 
@@ -124,11 +114,7 @@ def _default_step(base: Automaton, placed_effect: PlacedEffect) -> tuple[str, st
 def _with_visible_effect(
     whole: Automaton, placed_effect: PlacedEffect
 ) -> tuple[Automaton, dict[str, str]]:
-    """Return the automaton with the effect's parameters away from their neutral values, and these
-    values.
-
-    A parameter whose declared value is neutral takes the last start value of a fit.
-    """
+    """Return the automaton and values of the effect's parameters, none of them neutral."""
     brought = effect_names(placed_effect)
     parameters, values = dict(whole.parameters), dict[str, str]()
     for one in free_parameters_of(whole, list(brought)):
@@ -164,31 +150,22 @@ def _simulate(automaton: Automaton, project: Project, text: str) -> Trajectory:
 
 
 def draw_signature(signature: Signature) -> Picture:
-    """Draw both simulations for the first `MAX_OUTPUTS` (4) signals that are no modes, over time.
-
-    Below each plot is the difference, with minus without the effect. The title gives the effect and
-    place, its parameters and the step.
-    """
-    names = [
-        name
-        for name in signature.without_effect.signals
-        if name not in signature.without_effect.modes
-    ]
-    names = names[:MAX_OUTPUTS]
+    """Draw both simulations of the first `MAX_OUTPUTS` (4) signals with their difference below."""
+    one, other = signature.without_effect, signature.with_effect
+    names = [name for name in one.signals if name not in one.modes][:MAX_OUTPUTS]
     figure = Figure(figsize=(8.5, 1.0 + 2.1 * len(names)), layout="constrained")
     rows = figure.subplots(
         2 * len(names), 1, sharex=True, squeeze=False, height_ratios=[1.7, 1.0] * len(names)
     )
     for k, name in enumerate(names):
         above, beneath = rows[2 * k][0], rows[2 * k + 1][0]
-        one, other = signature.without_effect, signature.with_effect
         above.plot(one.times, one.signals[name], "--", color=RED, lw=1.2, label="without")
         above.plot(other.times, other.signals[name], color=BLUE, lw=1.2, label="with the effect")
         count = min(len(one.times), len(other.times))
         change = np.asarray(other.signals[name][:count], float) - one.signals[name][:count]
         beneath.plot(one.times[:count], change, color=BLUE, lw=1.1)
         beneath.axhline(0.0, color="black", lw=0.6)
-        label = f"{name.partition('.')[2] or name} [{signature.without_effect.units[name]}]"
+        label = f"{name.partition('.')[2] or name} [{one.units[name]}]"
         above.set_ylabel(label, fontsize=9, parse_math=False)
         beneath.set_ylabel("change", fontsize=9)
         for axis in (above, beneath):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 from language.expressions.parser import parse_expression
 from language.lowering.constants import evaluate_exactly
@@ -21,8 +22,7 @@ from language.text.document import ScalarNode
 PRIOR_STD = 0.15
 """Prior standard deviation of a base parameter: of its logarithm, or as a fraction of its range."""
 NEUTRAL_OFFSET = 0.02
-"""The first start of an effect parameter lies at this fraction of the way from neutral to the next.
-"""
+"""Distance from neutral to the first start of an effect parameter over that to the next start."""
 EFFECT_PRIOR_STD = 0.5
 """Prior standard deviation of an effect parameter, as a fraction of its range."""
 
@@ -31,9 +31,7 @@ EFFECT_PRIOR_STD = 0.5
 class FreeParameter:
     """A parameter [SI] with a coordinate z: value = start exp(sd z) if `is_log`, else start + sd z.
 
-    sd is `prior_std`. `low` and `high` are its range, `starts` the values from which fits begin.
-    With `per_recording` each recording has a value of its own. `is_order` marks a number of periods
-    over the path of an effect.
+    sd is `prior_std`; fits begin at `starts`. `is_order` marks a number of periods over a path.
     """
 
     name: str
@@ -54,10 +52,7 @@ class FreeParameter:
         return self.start + self.prior_std * z
 
     def coordinate(self, value: float) -> float:
-        """Return the coordinate of a value [SI], 0 for `start`; it may be outside the bounds.
-
-        Raises ValueError for a value that is not positive if `is_log` (and the start is positive).
-        """
+        """Return the coordinate of a value [SI]; ValueError for the logarithm of a negative one."""
         if self.is_log:
             return math.log(value / self.start) / self.prior_std
         return (value - self.start) / self.prior_std
@@ -73,10 +68,7 @@ def free_parameters_of(
 ) -> tuple[FreeParameter, ...]:
     """Return the real scalar parameters of an automaton with a range and a value, in its order.
 
-    `effects` names the parameters that effects add. Their prior is `EFFECT_PRIOR_STD` of the range,
-    and they have start values; that of others is `PRIOR_STD`. A coordinate is logarithmic if value
-    and range are positive; a lower bound of 0 of a positive base parameter becomes 0.1 % of its
-    value.
+    `effects` names the parameters that effects add, which have a wide prior and start values.
     """
     found = []
     for name, parameter in automaton.parameters.items():
@@ -89,43 +81,39 @@ def free_parameters_of(
 
 
 def _base_parameter(parameter: Parameter) -> FreeParameter:
-    """Return a base parameter as a free one: logarithmic if its range and value are positive.
-
-    A lower bound of 0 of a positive parameter becomes 0.1 % of its value.
-    """
+    """Return a base parameter as a free one; a lower bound of 0 becomes 0.1 % of its value."""
     assert parameter.range and parameter.value is not None
     low, high = (float(end) for end in parameter.range)
     value, unit = float(parameter.value), si_unit(parameter)
     if low >= 0.0 and value > 0.0:
         low = low if low > 0.0 else 1e-3 * value
         return FreeParameter(parameter.name, value, low, high, PRIOR_STD, True, unit=unit)
-    return FreeParameter(
-        parameter.name, value, low, high, PRIOR_STD * (high - low), False, unit=unit
-    )
+    spread = PRIOR_STD * (high - low)
+    return FreeParameter(parameter.name, value, low, high, spread, False, unit=unit)
 
 
 def _effect_parameter(parameter: Parameter) -> FreeParameter:
     """Return an effect parameter as a free one: logarithmic if its range and value are positive."""
     assert parameter.range and parameter.value is not None
     low, high = (float(end) for end in parameter.range)
-    fitting = parameter.fitting
-    value = float(parameter.value)
-    starts = _start_values(parameter, value)
-    each = fitting.per == "recording"
-    place = (parameter.name, value, low, high)
-    unit = si_unit(parameter)
-    if low > 0.0 and value > 0.0:
-        sd = EFFECT_PRIOR_STD * math.log(high / low)
-        return FreeParameter(*place, sd, True, each, starts, unit, fitting.form == "order")
-    return FreeParameter(*place, EFFECT_PRIOR_STD * (high - low), False, each, starts, unit)
+    fitting, value = parameter.fitting, float(parameter.value)
+    is_log = low > 0.0 and value > 0.0
+    return FreeParameter(
+        parameter.name,
+        value,
+        low,
+        high,
+        EFFECT_PRIOR_STD * (math.log(high / low) if is_log else high - low),
+        is_log,
+        fitting.per == "recording",
+        _start_values(parameter, value),
+        si_unit(parameter),
+        is_log and fitting.form == "order",
+    )
 
 
 def _start_values(parameter: Parameter, value: float) -> tuple[float, ...]:
-    """Return the values from which fits of an effect parameter start.
-
-    These are the declared starts; else, with a neutral value, one point near it and one at a tenth
-    of the way to the upper bound; else the declared value.
-    """
+    """Return the declared starts; else two points away from the neutral value; else the value."""
     fitting = parameter.fitting
     if fitting.starts:
         return tuple(float(start) for start in fitting.starts)
@@ -144,10 +132,7 @@ def si_unit(parameter: Parameter) -> str:
 
 
 def declared_value(automaton: Automaton, text: str) -> float | None:
-    """Return the value [SI] of a formula of numbers and parameters, as they are declared.
-
-    None for an empty text and for another formula.
-    """
+    """Return the value [SI] of a formula of numbers and declared parameters, else None."""
     if not text:
         return None
     scalar = ScalarNode(text, automaton.span)
@@ -155,3 +140,23 @@ def declared_value(automaton: Automaton, text: str) -> float | None:
         return float(evaluate_exactly(Formula(parse_expression(scalar), text), automaton))
     except SpecError:
         return None
+
+
+def format_value(value: float, parameter: Parameter) -> str:
+    """Return a value [SI] with six significant digits in the declared unit, as `0.12 kg*m^2`.
+
+    If the rounded value is outside the range of the parameter, the value is clipped to the range
+    and written in full. Without a unit the text is the number alone.
+    """
+    unit = parameter.unit
+    text = f"{in_unit(value, unit):.6g}"
+    if parameter.range:
+        low, high = ((end - unit.offset) / unit.factor for end in parameter.range)
+        if not low <= Fraction(text) <= high:
+            text = repr(min(max(in_unit(value, unit), float(low)), float(high)))
+    return text if unit.text == "1" else f"{text} {unit.text}"
+
+
+def in_unit(value: float, unit: Unit) -> float:
+    """Return a value [SI] in a unit."""
+    return (value - float(unit.offset)) / float(unit.factor)

@@ -14,10 +14,7 @@ from diagnosis.model.candidate import Candidate
 
 @dataclass(frozen=True)
 class ParameterVector:
-    """Coordinates: `shared` (parameters,) and `per_recording` (recordings, parameters).
-
-    Each free parameter has a column in both arrays; only the one that applies to it counts.
-    """
+    """Coordinates `shared` (parameters,) and `per_recording` (recordings, parameters)."""
 
     shared: Reals
     per_recording: Reals
@@ -25,9 +22,7 @@ class ParameterVector:
     def perturb(self, candidate: Candidate, index: int, size: float) -> ParameterVector:
         """Return a vector with coordinate `index` increased by `size`, or decreased at its bound.
 
-        It is decreased if the increased one exceeds the upper bound. Only the shared coordinate is
-        compared; the lower bound is not checked. The coordinate changes in the shared array and for
-        every recording.
+        The coordinate changes in the shared array and for every recording.
         """
         high = bounds_of(candidate)[index, 1]
         size = size if self.shared[index] + size <= high else -size
@@ -37,25 +32,20 @@ class ParameterVector:
         return ParameterVector(shared, own)
 
     def prior_cost(self, candidate: Candidate) -> float:
-        """Return half the sum of squares of the coordinates that count [nats].
-
-        This is the negative log density of the standard normal prior without its constant. A shared
-        coordinate counts once, one per recording for every recording.
-        """
+        """Return the negative log density [nats] of the prior, but for a constant."""
         own = per_recording_mask(candidate)
         return 0.5 * float((self.shared[~own] ** 2).sum() + (self.per_recording[:, own] ** 2).sum())
 
 
 def vector_of(candidate: Candidate, recordings: int, start: Mapping[str, float]) -> ParameterVector:
-    """Return the vector of given values [SI], clipped to the bounds.
+    """Return the vector of given values [SI], clipped to the bounds, for all recordings.
 
-    Parameters that are not in `start` have their first start value, or their declared value without
-    one; names that are no free parameters are ignored. Every recording has the same coordinates.
+    Parameters not in `start` have their first start value, or else their declared value.
     """
-    shared = []
-    for one in candidate.free_parameters:
-        value = start.get(one.name, one.starts[0] if one.starts else one.start)
-        shared.append(one.coordinate(value))
+    shared = [
+        one.coordinate(start.get(one.name, one.starts[0] if one.starts else one.start))
+        for one in candidate.free_parameters
+    ]
     bounds = bounds_of(candidate)
     z = np.clip(np.array(shared, dtype=float), bounds[:, 0], bounds[:, 1])
     return ParameterVector(z, np.tile(z, (recordings, 1)))
@@ -69,14 +59,11 @@ def extend_vector(
 ) -> ParameterVector:
     """Return the vector of a candidate with the coordinates of `base_point` where names agree.
 
-    Parameters that the base does not have are at `start`: values [SI] (or their first start value),
-    or a vector of the candidate. Parameters that only the base has are dropped.
+    Other parameters are at `start`: values [SI] as in `vector_of`, or a vector of the candidate.
     """
-    point = (
-        start
-        if isinstance(start, ParameterVector)
-        else vector_of(candidate, len(base_point.per_recording), start)
-    )
+    point = start
+    if not isinstance(point, ParameterVector):
+        point = vector_of(candidate, len(base_point.per_recording), point)
     point = ParameterVector(point.shared.copy(), point.per_recording.copy())
     names = candidate.names
     for k, name in enumerate(base.names):
@@ -87,10 +74,7 @@ def extend_vector(
 
 
 def values_at(candidate: Candidate, point: ParameterVector, recording: int) -> dict[str, float]:
-    """Return the values [SI] of the free parameters for one recording (its index), by name.
-
-    They include noise parameters and follow the order of the candidate.
-    """
+    """Return the values [SI] of the free parameters by name for one recording (its index)."""
     return {
         one.name: one.value(
             float(point.per_recording[recording, k] if one.per_recording else point.shared[k])
@@ -100,10 +84,7 @@ def values_at(candidate: Candidate, point: ParameterVector, recording: int) -> d
 
 
 def all_values_at(candidate: Candidate, point: ParameterVector) -> list[dict[str, float]]:
-    """Return the values [SI] by name for every recording of the vector.
-
-    The dict is the same object for all recordings if no parameter is per recording.
-    """
+    """Return the values [SI] by name for every recording; one dict if all are shared."""
     shared, recordings = values_at(candidate, point, 0), range(len(point.per_recording))
     own = [(k, one) for k, one in enumerate(candidate.free_parameters) if one.per_recording]
     if not own:

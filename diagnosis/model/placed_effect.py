@@ -41,6 +41,7 @@ PLACE_KIND_BY_SECTION = {
     "outputs": "output",
 }
 """The kind of place that the names of a section denote."""
+SECTION_BY_PLACE_KIND = {kind: section for section, kind in PLACE_KIND_BY_SECTION.items()}
 
 MAX_STEP = Fraction(5, 1000)
 """Longest major step [s] of a prediction; events inside a step are located."""
@@ -49,8 +50,7 @@ PARAMETER_FACTOR = Fraction(4)
 """Factor by which an effect's parameter may change in a fit, for the choice of a stable step."""
 
 MIN_DELAY_STEPS = 4
-"""Fewest major steps between two samples of a model with a delay, which is at least one step long.
-"""
+"""Fewest major steps between samples of a model with a delay, which is at least one step long."""
 
 MAX_ANGLE_STEP = Fraction(1, 1000)
 """Longest major step [s] of a model with an effect at an input that depends on an angle.
@@ -91,11 +91,7 @@ class PlacedEffect:
 
 
 def read_effects(folder: Path) -> tuple[Effect, ...]:
-    """Return the effects in the files `*.yaml` directly in a folder, sorted by file name.
-
-    Empty if there is no such file. Raises SpecError, with the problems of all files that can be
-    parsed.
-    """
+    """Return the effects in the files `*.yaml` directly in a folder; may raise SpecError."""
     problems = Problems()
     found = [read_effect(read_document(path), problems) for path in sorted(folder.glob("*.yaml"))]
     problems.raise_if_errors()
@@ -103,58 +99,34 @@ def read_effects(folder: Path) -> tuple[Effect, ...]:
 
 
 def shipped_effects() -> tuple[Effect, ...]:
-    """Return the effects of the shipped library, sorted by file name.
-
-    The files are read at each call.
-    """
+    """Return the effects of the shipped library, sorted by file name."""
     return read_effects(Path(str(resources.files("spec"))) / "effects")
 
 
 def disturbance_effect(kind: str, place: str) -> PlacedEffect:
-    """Return the disturbance at a place; `kind` is "balance", "element" or "output".
-
-    The effect is read from `drift_of_<kind>.yaml`; its suffix is `<kind>_<place>`. Whether the
-    place exists is not checked.
-    """
+    """Return the disturbance at a place; `kind` is "balance", "element" or "output"."""
     path = Path(str(resources.files("diagnosis.model"))) / "disturbances" / f"drift_of_{kind}.yaml"
     return PlacedEffect(read_effect(read_document(path), Problems()), place, f"{kind}_{place}")
 
 
 def find_placements(document: Document, effect: Effect) -> tuple[PlacedEffect, ...]:
-    """Return an effect at every place of an expanded automaton that matches it.
-
-    Candidates are the names in the sections flow, inputs, elements and outputs of the kinds of the
-    effect, in the order in which these sections first name them. The suffix is the name of the
-    place. Whether the automaton with the effect is valid is not checked.
-    """
+    """Return an effect at every place of an expanded automaton that matches its patterns."""
     root, kinds = document.root, {fit.kind for fit in effect.place_patterns}
-    names = [
-        name
+    return tuple(
+        PlacedEffect(effect, name, name)
         for name, own in _place_kinds(document).items()
         if own & kinds and not isinstance(find_effect_place(root, effect, name), PlaceMismatch)
-    ]
-    return tuple(PlacedEffect(effect, name, name) for name in names)
+    )
 
 
 def overlay_effects(document: Document, placed_effects: Sequence[PlacedEffect]) -> Document:
-    """Return an expanded document with effects applied in the given order.
-
-    Raises SpecError at the first effect that cannot be applied; the result is not checked as an
-    automaton. `document` is not changed.
-    """
+    """Return an expanded document with effects applied in order; SpecError if one cannot be."""
     problems = Problems()
     root = document.root
     span = Span(Source("diagnosis"), 1, 1)
     for placed_effect in placed_effects:
-        application = EffectApplication(
-            placed_effect.effect,
-            placed_effect.place,
-            placed_effect.suffix,
-            {},
-            {},
-            span,
-            placed_effect.scales,
-        )
+        names = placed_effect.effect, placed_effect.place, placed_effect.suffix
+        application = EffectApplication(*names, {}, {}, span, placed_effect.scales)
         root = apply_effect(root, application, problems)
         problems.raise_if_errors()
     return dataclasses.replace(document, root=root)
@@ -163,10 +135,7 @@ def overlay_effects(document: Document, placed_effects: Sequence[PlacedEffect]) 
 def automaton_with_effects(
     document: Document, project: Project, placed_effects: Sequence[PlacedEffect]
 ) -> Automaton:
-    """Return the checked automaton of an expanded document with effects applied in the given order.
-
-    Raises SpecError if an effect cannot be applied or the result is invalid.
-    """
+    """Return the automaton of a document with effects; SpecError if that is invalid."""
     return automaton_of(overlay_effects(document, placed_effects), project)
 
 
@@ -179,11 +148,10 @@ def lower_tunable_program(
 ) -> tuple[Program, int]:
     """Return the Program in which `names` are tunable, and the major steps in a period [s].
 
-    The step divides the period into at least `min_substeps` and at most `MAX_STEPS` (40) parts and
-    is at most `MAX_STEP` (5 ms) or the period. It is at most the `time_resolution` at the declared
-    parameters and with those of `effect_parameters` at a quarter and four times their values
-    (within their ranges), and not longer than any nonzero time among these: the eigenvalue of a
-    limited rate is not known beforehand.
+    The step divides the period into `min_substeps` to `MAX_STEPS` (40) parts. It is at most
+    `MAX_STEP` or the period, and the `time_resolution` with `effect_parameters` at a quarter and
+    four times their values, and any nonzero time among these: the eigenvalue of a limited rate is
+    not known beforehand.
     """
     scaled = [
         _scale_parameters(automaton, effect_parameters, factor)
@@ -220,19 +188,15 @@ def minimum_substeps(
 ) -> int:
     """Return the fewest major steps in a sample period [s] for a model with effects.
 
-    For an effect at an input and a model that calls `floor` (an angle) the steps are at most
-    `MAX_ANGLE_STEP` (1 ms) long. Otherwise it is `MIN_DELAY_STEPS` (4) for a model with a delay or
-    with direct feed-through to a compared output (an output is constant within a step), else 1.
+    Steps are at most `MAX_ANGLE_STEP` (1 ms) for an effect at an input that depends on an angle;
+    there are `MIN_DELAY_STEPS` (4) with a delay or direct feed-through (an output is constant
+    within a step).
     """
-    at_input = any(
-        placed_effect.effect.place_patterns[0].kind == "input" for placed_effect in placed_effects
-    )
-    if at_input and uses_function(automaton, "floor"):
+    is_at_input = any(one.effect.place_patterns[0].kind == "input" for one in placed_effects)
+    if is_at_input and uses_function(automaton, "floor"):
         return int(-(-period // MAX_ANGLE_STEP))
-    is_short = memory_calls_by_key(automaton, ("delay",)) or has_feedthrough(
-        automaton, output_names
-    )
-    return MIN_DELAY_STEPS if is_short else 1
+    has_delay = bool(memory_calls_by_key(automaton, ("delay",)))
+    return MIN_DELAY_STEPS if has_delay or has_feedthrough(automaton, output_names) else 1
 
 
 def _scale_parameters(automaton: Automaton, names: Sequence[str], factor: Fraction) -> Automaton:
@@ -248,9 +212,7 @@ def _scale_parameters(automaton: Automaton, names: Sequence[str], factor: Fracti
 
 
 def _place_kinds(document: Document) -> dict[str, set[str]]:
-    """Return the names in a document to which effects could apply,
-    with the possible kinds of place.
-    """
+    """Return the possible kinds of place of each name in a document."""
     found: dict[str, set[str]] = {}
     for section, kind in PLACE_KIND_BY_SECTION.items():
         node = document.root.get(section)
@@ -263,25 +225,13 @@ def _place_kinds(document: Document) -> dict[str, set[str]]:
     return found
 
 
-SECTION_BY_PLACE_KIND = {
-    "balance": "flow",
-    "input": "inputs",
-    "output": "outputs",
-    "element": "elements",
-}
-
-
 def place_path(placed_effect: PlacedEffect) -> str:
-    """Return `section.name` of the place of an effect, by the kind of its first place pattern.
-
-    The section is flow, inputs, outputs or elements.
-    """
+    """Return `section.name` of the place of an effect, by its first place pattern."""
     kind = placed_effect.effect.place_patterns[0].kind
     return f"{SECTION_BY_PLACE_KIND[kind]}.{placed_effect.place}"
 
 
 def effect_names(placed_effect: PlacedEffect) -> dict[str, str]:
     """Return the names that an effect adds to the automaton, mapped to their names in its file."""
-    return {
-        placed_effect.qualified_name(name): name for name in added_names(placed_effect.effect.body)
-    }
+    names = added_names(placed_effect.effect.body)
+    return {placed_effect.qualified_name(name): name for name in names}

@@ -21,8 +21,7 @@ from diagnosis.localisation.location_text import format_location
 from diagnosis.localisation.ranking import localise
 from diagnosis.model.parameter_vector import extend_vector
 from diagnosis.pipeline.diagnosis_case import Case
-from diagnosis.result.effect_naming import verdict_id
-from diagnosis.result.verdict import DecisionOutcome
+from diagnosis.result.verdict import DecisionOutcome, verdict_id
 from diagnosis.selection.candidate_search import CandidateFit
 from diagnosis.selection.comparison import effective_gain
 from diagnosis.selection.forward_selection import (

@@ -36,13 +36,18 @@ from diagnosis.localisation.ranking import rank_accepted_first, rank_causes_firs
 from diagnosis.model.placed_effect import PlacedEffect, place_path
 from diagnosis.pipeline.decision import decide
 from diagnosis.pipeline.diagnosis_case import Case, build_model_set, read_series
-from diagnosis.result.effect_naming import named_effect_of, verdict_id
-from diagnosis.result.verdict import DecisionOutcome, NamedEffect, RankedCandidate, Verdict
+from diagnosis.result.verdict import (
+    DecisionOutcome,
+    NamedEffect,
+    RankedCandidate,
+    Verdict,
+    named_effect_of,
+    verdict_id,
+)
 from diagnosis.selection.candidate_search import CandidateFit
 from diagnosis.selection.forward_selection import Selection
 from diagnosis.selection.intersample import LogCallback
-from diagnosis.validation.free_simulation import compare_misfits
-from diagnosis.validation.misfit import Misfit
+from diagnosis.validation.free_simulation import Misfit, compare_misfits
 from diagnosis.validation.oscillation import Oscillation, analyse_oscillation
 from engine.recordings.recording_window import paths_overlap, strip_window_suffix
 from language.loading.load import automaton_of

@@ -16,13 +16,11 @@ from diagnosis.data.sampled_recording import compared_outputs, share_period
 from diagnosis.estimation.covariance import correlations_of, quantities_of
 from diagnosis.estimation.estimate import Estimate, evaluate
 from diagnosis.estimation.quantity import Quantity
-from diagnosis.model.parameter import FreeParameter
-from diagnosis.model.parameter_text import format_value
+from diagnosis.model.parameter import FreeParameter, format_value
 from diagnosis.model.parameter_vector import vector_of
 from diagnosis.pipeline.diagnosis_case import Case, build_model_set, file_digests, read_series
 from diagnosis.selection.intersample import LogCallback, fit_base
-from diagnosis.validation.free_simulation import compare_misfits
-from diagnosis.validation.misfit import Misfit
+from diagnosis.validation.free_simulation import Misfit, compare_misfits
 from language.loading.load import automaton_of
 from language.model.automaton import Automaton
 from language.model.declaration import Parameter

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,9 +21,8 @@ from language.model.automaton import Automaton
 class DiagnosisReport:
     """A verdict on `case`, with the check of its recordings.
 
-    `diagnosis` is None if the recordings are not usable, or if the diagnosis ended early for
-    `end_reason`. `held_out` are digests of the files that were read after the verdict, by name.
-    `unused_recordings` are those that were left out because of findings.
+    `diagnosis` is None if the recordings are not usable or the diagnosis ended for `end_reason`.
+    `held_out` are digests by name.
     """
 
     case: Case
@@ -46,20 +46,14 @@ class DiagnosisReport:
 
 
 def verdict_to_json(verdict: Verdict) -> dict[str, Any]:
-    """Return the JSON object of a verdict, as in `verdict.json`.
-
-    Numbers that are not finite become None.
-    """
+    """Return the JSON object of `verdict.json`, with None for numbers that are not finite."""
     found = replace_non_finite(verdict.to_json())
     assert isinstance(found, dict)
     return found
 
 
 def replace_non_finite(value: Any) -> Any:
-    """Return nested dicts and lists with None in place of floats that are not finite.
-
-    Other values, also tuples and what they contain, are returned unchanged.
-    """
+    """Return dicts and lists with None in place of floats that are not finite."""
     if isinstance(value, dict):
         return {key: replace_non_finite(one) for key, one in value.items()}
     if isinstance(value, list):
@@ -68,11 +62,7 @@ def replace_non_finite(value: Any) -> Any:
 
 
 def unusable_reasons(check: RecordingCheck) -> tuple[str, ...]:
-    """Return the messages of a verdict on unusable recordings.
-
-    The first is "the recordings are not usable"; the lines of `format_findings` for the errors
-    follow.
-    """
+    """Return the messages of a verdict on unusable recordings, with the lines of errors."""
     return (
         "the recordings are not usable",
         *(text for _, text in format_findings(recording_errors(check))),
@@ -82,11 +72,28 @@ def unusable_reasons(check: RecordingCheck) -> tuple[str, ...]:
 def undecided_verdict(
     messages: tuple[str, ...], train: Mapping[str, str], runtime_s: float
 ) -> Verdict:
-    """Return the verdict `unknown` without a diagnosis; `messages` give the reasons.
-
-    `train` are digests of the files by name, `runtime_s` is the run time [s]. There are no effects
-    and candidates, and the probability of another cause is 1.
-    """
+    """Return the verdict `unknown` without a diagnosis; `train` are digests by name."""
     return Verdict(
         "unknown", (), (), 1.0, (), (), {"train": {}}, {}, None, runtime_s, messages, train
     )
+
+
+CONSTANT_MODEL_NRMSE = 1.0
+"""Normalised error of the mean of a recorded signal."""
+
+
+def unfollowed_signals(verdict: Verdict) -> Iterator[str]:
+    """Yield a message for each signal whose misfit is NaN or above `CONSTANT_MODEL_NRMSE`."""
+    for part, signals in verdict.fit.items():
+        for name, misfit in signals.items():
+            share = misfit.nrmse_after
+            if share > CONSTANT_MODEL_NRMSE or math.isnan(share):
+                where = f"{part.replace('_', ' ')}: free simulation misses `{name}`"
+                yield f"{where} by {100 * share:.0f} % of its spread, a constant by 100 %"
+
+
+def withdraw_nothing_missing(verdict: Verdict, unfollowed: Sequence[str]) -> Verdict:
+    """Return the verdict, `unknown` for `nothing_missing` with `unfollowed` signals."""
+    if unfollowed and verdict.verdict == "nothing_missing":
+        return dataclasses.replace(verdict, verdict="unknown")
+    return verdict

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from matplotlib.figure import Figure
 
+from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.place_magnitude import disturbance_unit
 from diagnosis.experiment.discrimination import ExperimentPlan
@@ -21,7 +22,13 @@ from diagnosis.report import report_text as sentences
 from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.model_comparison import ModelComparison
 from diagnosis.report.number_text import format_percent, format_significant
-from diagnosis.report.window_figure import draw_window
+from diagnosis.report.window_figure import (
+    draw_inputs,
+    draw_window,
+    moving_inputs,
+    set_title,
+    set_ylabel,
+)
 from diagnosis.validation.oscillation import Oscillation
 from diagnosis.validation.whiteness import WhitenessTest
 from diagnosis.validation.worst_window import WorstWindow
@@ -30,15 +37,11 @@ from engine.results.plot import Picture
 from language.overlays.name_types import format_si_unit
 from language.text.sanitise import escape_invisible
 
-BLUE, RED, GREEN, _, _, PURPLE, GREY = PALETTE
+BLUE, RED, _, _, _, _, GREY = PALETTE
 
 
 def draw_locations(locations: Sequence[Location]) -> Picture:
-    """Draw a bar with its gain [nats] for each location, the largest one on top and in blue.
-
-    A negative gain is drawn as 0, an infinite gain (the base diverges) beyond the others; a gain of
-    NaN is left out.
-    """
+    """Draw a bar with its gain [nats], at least 0, for each location, the largest one in blue."""
     known = [location for location in locations if not math.isnan(location.gain)]
     shown = sorted(known, key=lambda location: location.gain)
     figure = Figure(figsize=(7.0, 0.9 + 0.38 * max(1, len(shown))), layout="constrained")
@@ -59,9 +62,6 @@ def draw_locations(locations: Sequence[Location]) -> Picture:
     return Picture(figure)
 
 
-MAX_INPUTS = 3
-
-
 def draw_disturbance(
     location: Location,
     series: SampledRecording,
@@ -70,18 +70,16 @@ def draw_disturbance(
     unit: str,
     inputs: Mapping[str, str],
 ) -> Picture:
-    """Draw a disturbance in one recording with its band of three standard deviations.
+    """Draw a disturbance with its band and windows, above up to three varying inputs of one unit.
 
-    The windows of the location in this recording are shaded. Below are up to `MAX_INPUTS` (3)
-    varying inputs, those in the unit of the first one, if there are any; `inputs` are all inputs
-    with their units, in the order of the recording's columns. `title` and `unit` label the axis.
+    `inputs` are all inputs with their units; `title` and `unit` label the disturbance.
     """
     values, reach = disturbance.values, SIGNIFICANT_STDS * disturbance.stds
     first = series.count - len(values)
-    times = float(series.start) + np.arange(first, series.count) * float(series.period)
-    moving = [k for k in range(len(inputs)) if float(np.ptp(series.inputs[:, k])) > 0.0]
-    names, units = list(inputs), list(inputs.values())
-    moving = [k for k in moving if units[k] == units[moving[0]]][:MAX_INPUTS]
+    times: Reals = np.arange(first, series.count, dtype=np.float64) * float(series.period)
+    times += float(series.start)
+    moving = moving_inputs(series.inputs, inputs)
+    names = list(inputs)
     figure = Figure(figsize=(8.5, 4.2 if moving else 2.8), layout="constrained")
     heights = [1.7, 1.0] if moving else [1.7]
     rows = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)
@@ -92,16 +90,11 @@ def draw_disturbance(
     for start, end, name in location.windows:
         if name == series.name:
             above.axvspan(start, end, color=RED, alpha=0.12, lw=0)
-    above.set_ylabel(escape_invisible(f"{title} [{unit}]"), fontsize=9, parse_math=False)
-    above.set_title(escape_invisible(series.name), loc="left", fontsize=10, parse_math=False)
-    for k, colour in zip(moving, (GREEN, PURPLE, GREY), strict=False):
-        beneath.plot(
-            times, series.inputs[first:, k], color=colour, lw=1.1, label=escape_invisible(names[k])
-        )
+    set_ylabel(above, f"{title} [{unit}]")
+    set_title(above, series.name)
     if moving:
-        beneath.set_ylabel(
-            escape_invisible(f"inputs [{units[moving[0]]}]"), fontsize=8, parse_math=False
-        )
+        draw_inputs(beneath, times, series.inputs[first:], names, moving)
+        set_ylabel(beneath, f"inputs [{inputs[names[moving[0]]]}]", 8)
         beneath.legend(loc="best", fontsize=8)
     for axis in (above, beneath):
         axis.grid(alpha=0.3)
@@ -113,10 +106,9 @@ def draw_disturbance(
 def draw_experiment(
     plan: ExperimentPlan, inputs: Mapping[str, str], signals: Sequence[tuple[str, str]]
 ) -> Picture:
-    """Draw the first manoeuvre of a plan: varying inputs on top, one plot for each output below.
+    """Draw the first manoeuvre of a plan, and each output as each candidate simulates it.
 
-    Each output is drawn as each candidate simulates it. `inputs` and `signals` give names with
-    units, in the order of the columns. The plan must have a manoeuvre.
+    `inputs` and `signals` give names with units, in the order of the columns.
     """
     best = plan.options[0]
     series = best.manoeuvre.series
@@ -125,68 +117,44 @@ def draw_experiment(
     count = 1 + len(signals)
     figure = Figure(figsize=(8.5, 0.8 + 1.7 * count), layout="constrained")
     axes = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
-    names = list(inputs.items())
+    names = list(inputs)
     for k in moved:
-        axes[0].plot(
-            time, series.inputs[:, k], color="black", lw=1.2, label=escape_invisible(names[k][0])
-        )
-    axes[0].set_ylabel(
-        escape_invisible(f"inputs [{names[moved[0]][1] if moved else ''}]"),
-        fontsize=9,
-        parse_math=False,
-    )
+        label = escape_invisible(names[k])
+        axes[0].plot(time, series.inputs[:, k], color="black", lw=1.2, label=label)
+    set_ylabel(axes[0], f"inputs [{inputs[names[moved[0]]] if moved else ''}]")
     for row, (name, unit) in enumerate(signals):
-        axis = axes[row + 1]
         for place, (title, shown) in enumerate(zip(plan.names, best.outputs, strict=True)):
-            style = ("-", "--", ":")[place % 3]
-            axis.plot(
-                time,
-                shown[:, row],
-                style,
-                color=PALETTE[place],
-                lw=1.3,
-                label=escape_invisible(title),
-            )
-        axis.set_ylabel(escape_invisible(f"{name} [{unit}]"), fontsize=9, parse_math=False)
+            style, label = ("-", "--", ":")[place % 3], escape_invisible(title)
+            colour = PALETTE[place]
+            axes[row + 1].plot(time, shown[:, row], style, color=colour, lw=1.3, label=label)
+        set_ylabel(axes[row + 1], f"{name} [{unit}]")
     for axis in axes:
         axis.grid(alpha=0.3)
     axes[0].legend(loc="best", fontsize=8)
     axes[1].legend(loc="best", fontsize=8)
-    axes[0].set_title(
-        escape_invisible(best.manoeuvre.name), loc="left", fontsize=11, parse_math=False
-    )
+    set_title(axes[0], best.manoeuvre.name, 11)
     axes[-1].set_xlabel("time [s]")
     return Picture(figure)
 
 
-OSCILLATION_LABELS = ("simulated, recalibrated", "simulated, with what was found")
+OSCILLATION_STYLES = (
+    ("--", RED, "simulated, recalibrated"),
+    ("-", BLUE, "simulated, with what was found"),
+)
 
 
 def draw_oscillation(oscillations: Sequence[Oscillation], unit: str) -> Picture:
-    """Draw frequency over amplitude of the cycles, recorded and simulated by one or two models.
-
-    The recorded cycles are those of the first oscillation; the labels are `OSCILLATION_LABELS`.
-    `unit` is that of the amplitude.
-    """
+    """Draw frequency over amplitude [unit] of the cycles, recorded and by one or two models."""
     figure = Figure(figsize=(7.0, 3.2), layout="constrained")
     axis = figure.subplots()
     first = oscillations[0]
-    axis.semilogx(first.recorded.amplitudes, first.recorded.frequencies, "o", color="black", ms=4)
-    axis.lines[0].set_label("recorded")
-    for one, colour, label, style in zip(
-        oscillations, (RED, BLUE), OSCILLATION_LABELS, ("--", "-"), strict=False
-    ):
-        axis.semilogx(
-            one.simulated.amplitudes,
-            one.simulated.frequencies,
-            style,
-            color=colour,
-            lw=1.4,
-            label=label,
-        )
-    axis.set_xlabel(
-        escape_invisible(f"amplitude of a cycle of {first.signal} [{unit}]"), parse_math=False
-    )
+    own = first.recorded
+    axis.semilogx(own.amplitudes, own.frequencies, "o", color="black", ms=4, label="recorded")
+    for one, (style, colour, label) in zip(oscillations, OSCILLATION_STYLES, strict=False):
+        own = one.simulated
+        axis.semilogx(own.amplitudes, own.frequencies, style, color=colour, lw=1.4, label=label)
+    text = escape_invisible(f"amplitude of a cycle of {first.signal} [{unit}]")
+    axis.set_xlabel(text, parse_math=False)
     axis.set_ylabel("frequency [Hz]")
     axis.grid(alpha=0.3, which="both")
     axis.legend(loc="best", fontsize=8)
@@ -196,11 +164,7 @@ def draw_oscillation(oscillations: Sequence[Oscillation], unit: str) -> Picture:
 def draw_whiteness(
     before: Sequence[WhitenessTest], after: Sequence[WhitenessTest], is_base_only: bool
 ) -> Picture:
-    """Draw the autocorrelations of innovations by lag [ms], with the 99 % band, a plot per signal.
-
-    `before` is the base, `after` the final model. With `is_base_only` no effect was accepted, so
-    only the base is drawn.
-    """
+    """Draw the autocorrelations of innovations by lag [ms] with the 99 % band, for each signal."""
     figure = Figure(figsize=(8.5, 2.7), layout="constrained")
     axes = figure.subplots(1, len(before), squeeze=False, sharey=True)[0]
     for axis, old, new in zip(axes, before, after, strict=True):
@@ -211,7 +175,7 @@ def draw_whiteness(
         axis.plot(lags, old.correlations, "s--", color=RED, ms=3.5, lw=1.0, label=first)
         if not is_base_only:
             axis.plot(lags, new.correlations, "o-", color=BLUE, ms=3.0, lw=1.2, label="with")
-        axis.set_title(escape_invisible(old.signal), loc="left", fontsize=10, parse_math=False)
+        set_title(axis, old.signal)
         axis.set_xlabel("lag [ms]", fontsize=9)
         axis.grid(alpha=0.3)
         axis.tick_params(labelsize=8)
@@ -221,13 +185,9 @@ def draw_whiteness(
 
 
 SVG_HEAD = re.compile(r"^.*?<svg ", re.DOTALL)
-
 METADATA = re.compile(r"<metadata>.*?</metadata>", re.DOTALL)
-
 SVG_IDENTIFIER = re.compile(r'(\bid="|href="#|url\(#)')
-"""Places where an SVG defines or uses an identifier;
-these must differ between figures of a page.
-"""
+"""Places where an SVG has an identifier, which must differ between figures of a page."""
 
 
 @dataclass(frozen=True)
@@ -243,12 +203,9 @@ class ReportFigure:
 def report_figures(
     report: DiagnosisReport, comparisons: Sequence[ModelComparison]
 ) -> list[ReportFigure]:
-    """Return the figures of a report: windows, whiteness, places, disturbance, oscillation, plan.
+    """Return the figures of a report that have content: windows, whiteness, places, and others.
 
-    There is a worst window for each of `comparisons`; whiteness is of the first one. Figures
-    without content are left out: places without a gain, a disturbance without a significant window,
-    an oscillation that the base follows, a plan that does not discriminate. The report must have a
-    diagnosis.
+    The report must have a diagnosis; whiteness is that of the first comparison.
     """
     assert report.diagnosis
     is_same = not report.diagnosis.selection.accepted
@@ -272,25 +229,17 @@ def report_figures(
 
 
 def window_caption(window: WorstWindow, is_base_only: bool) -> str:
-    """Return the caption of a window with the largest error of each signal in free simulation.
-
-    It is "<Title>. Left alone the model misses w by up to 1.2 rad/s without, 0.30 rad/s with;
-    ...."; with `is_base_only` only the error of the base. The error is `-` for a signal without
-    values.
-    """
+    """Return the title of a window and the largest error of each signal in free simulation."""
     alone = window.times >= window.free_from
     texts = []
     for k, (name, unit) in enumerate(zip(window.signals, window.units, strict=True)):
         sizes = []
         for run in (window.before, window.after):
             missed = np.abs(window.measured[alone, k] - run[alone, k])
-            sizes.append(float(np.nanmax(missed)) if np.isfinite(missed).any() else np.nan)
-        text = f"{name} by up to {format_significant(sizes[0], 2)} {unit}"
-        texts.append(
-            text
-            if is_base_only
-            else f"{text} without, {format_significant(sizes[1], 2)} {unit} with"
-        )
+            size = float(np.nanmax(missed)) if np.isfinite(missed).any() else np.nan
+            sizes.append(f"{format_significant(size, 2)} {unit}")
+        amount = sizes[0] if is_base_only else f"{sizes[0]} without, {sizes[1]} with"
+        texts.append(f"{name} by up to {amount}")
     words = window.title[0].upper() + window.title[1:]
     return f"{words}. Left alone the model misses {'; '.join(texts)}."
 
@@ -299,12 +248,9 @@ def _whiteness_figure(comparison: ModelComparison, is_base_only: bool) -> Report
     """Return the figure of the innovations' autocorrelation on one set of recordings."""
     parts = []
     for before, after in zip(comparison.before, comparison.after, strict=True):
-        text = f"{before.signal} {format_percent(before.predictable_fraction)}"
-        parts.append(
-            text
-            if is_base_only
-            else f"{text} without, {format_percent(after.predictable_fraction)} with"
-        )
+        sizes = [format_percent(one.predictable_fraction) for one in (before, after)]
+        amount = sizes[0] if is_base_only else f"{sizes[0]} without, {sizes[1]} with"
+        parts.append(f"{before.signal} {amount}")
     caption = (
         f"Autocorrelation of the errors of one-step prediction ({comparison.label} recordings). "
         f"Part that is predictable from their past: {'; '.join(parts)}; none for white noise."
@@ -321,9 +267,8 @@ def _oscillation_figure(report: DiagnosisReport, comparison: ModelComparison) ->
     found = report.diagnosis.oscillations
     units = dict(zip(comparison.window.signals, comparison.window.units, strict=True))
     caption = f"How the frequency goes with the amplitude: {text}."
-    return [
-        ReportFigure("shuffle", caption, caption, draw_oscillation(found, units[found[0].signal]))
-    ]
+    picture = draw_oscillation(found, units[found[0].signal])
+    return [ReportFigure("shuffle", caption, caption, picture)]
 
 
 def _location_figure(report: DiagnosisReport) -> ReportFigure:
@@ -338,17 +283,11 @@ def _location_figure(report: DiagnosisReport) -> ReportFigure:
 
 
 def _disturbance_figure(report: DiagnosisReport, inputs: Mapping[str, str]) -> list[ReportFigure]:
-    """Return the figure of the disturbance at the first location, in the recording of its longest
-    window.
-
-    The list is empty if nothing is missing or there is no significant window.
-    """
-    best = report.verdict.location[0]
-    if report.diagnosis is None or report.verdict.verdict == "nothing_missing":
+    """Return the figure of the first location's longest window in a list; empty without one."""
+    best, found = report.verdict.location[0], report.diagnosis
+    if found is None or report.verdict.verdict == "nothing_missing" or not best.windows:
         return []
-    if not best.windows:
-        return []
-    model_set = report.diagnosis.model_set
+    model_set = found.model_set
     names = [one.name for one in model_set.series]
     place = names.index(best.windows[0][2])
     section, _, name = balance_of(model_set, best.section, best.place).partition(".")
@@ -366,11 +305,7 @@ def _disturbance_figure(report: DiagnosisReport, inputs: Mapping[str, str]) -> l
 
 
 def embed_svg(figure: ReportFigure, data: bytes) -> str:
-    """Return an SVG file as an element of a page, with the figure's alternative text as label.
-
-    All before the first `<svg ` and the metadata are removed; identifiers and references to them
-    get the prefix `<figure name>-`, so that figures of a page do not share any.
-    """
+    """Return an SVG as an element of a page; the figure's name makes its identifiers unique."""
     label = html.escape(figure.alternative_text, quote=True)
     text = SVG_IDENTIFIER.sub(rf"\g<1>{figure.name}-", METADATA.sub("", data.decode()))
     return SVG_HEAD.sub(f'<svg role="img" aria-label="{label}" ', text, count=1)

@@ -22,10 +22,7 @@ from language.overlays.name_types import format_si_unit
 
 @dataclass(frozen=True)
 class ModelComparison:
-    """A set of recordings: `dataset` as in verdicts, `label` in words, `units` by signal.
-
-    `window` is the worst window; `before` and `after` are whiteness tests of both models.
-    """
+    """The worst window and the whiteness tests of both models on one set of recordings."""
 
     dataset: str
     label: str
@@ -39,8 +36,7 @@ class ModelComparison:
 def compare_models(report: DiagnosisReport) -> list[ModelComparison]:
     """Return the comparison on held-out recordings (if any), then on training recordings.
 
-    The datasets are `held_out` and `train`. The list is empty without a diagnosis. For held-out
-    recordings, parameters per recording are fitted.
+    Parameters per recording are fitted to held-out recordings.
     """
     found = report.diagnosis
     if found is None:

@@ -10,11 +10,9 @@ DIMENSIONLESS = ("1", "")
 
 
 def format_with_std(value: float, std: float) -> str:
-    """Return `3.770 ± 0.051`: the value with the places of a two-digit standard deviation.
+    """Return `3.770 ± 0.051`: a value with the places of a two-digit standard deviation.
 
-    Large deviations give rounded integers (`12300 ± 450`); values from 1e6 on and deviations below
-    about 1e-7 give `%g` forms. Without a finite positive standard deviation the value has four
-    significant digits; `-` if the value is not finite.
+    Without a finite positive one the value has four significant digits.
     """
     if not (math.isfinite(value) and math.isfinite(std)) or std <= 0.0:
         return format_significant(value, 4)
@@ -35,10 +33,7 @@ def format_quantity(quantity: Quantity) -> str:
 
 
 def format_significant(value: float, digits: int = 3) -> str:
-    """Return a number with significant digits; `-` if it is not finite.
-
-    Numbers from 1e-4 to 1e6 have no exponent and keep trailing zeros (`0.500`); 0 is `0`.
-    """
+    """Return `0.500`: a number with significant digits, without exponent from 1e-4 to 1e6."""
     if not math.isfinite(value):
         return "-"
     value = float(f"{value:.{digits}g}")
@@ -49,10 +44,7 @@ def format_significant(value: float, digits: int = 3) -> str:
 
 
 def format_percent(part: float) -> str:
-    """Return a fraction as `0.96 %`, `3.2 %` or `45 %`; `-` if it is not finite.
-
-    There are two decimals below 1 % (in magnitude), one below 10 %, else none.
-    """
+    """Return a fraction as `0.96 %`, `3.2 %` or `45 %`; `-` if it is not finite."""
     value = 100.0 * part
     if not math.isfinite(value):
         return "-"
@@ -61,11 +53,7 @@ def format_percent(part: float) -> str:
 
 
 def format_change(before: float, after: float) -> str:
-    """Return the relative change of a misfit: `−52 %`, `+7 %`, `as before`, or `-` if undefined.
-
-    A change below 0.5 % is `as before`. It is undefined if a value is not finite or `before` is not
-    positive. The minus sign is U+2212.
-    """
+    """Return a relative change: `−52 %`, `+7 %`, `as before` below 0.5 %, `-` if undefined."""
     if not (math.isfinite(before) and math.isfinite(after)) or before <= 0.0:
         return "-"
     part = 100.0 * (after / before - 1.0)

@@ -10,18 +10,15 @@ from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.number_text import format_change, format_with_std
 from diagnosis.selection.forward_selection import Selection
 from language.text.document import MappingNode
+from language.text.node_edit import mapping_entries
 
 MIN_BIAS, MIN_BIAS_STDS, MAX_BIASED = 0.03, 3.0, 5
-"""Relative bias and standard deviations from which a parameter is biased,
-and how many are named.
-"""
+"""Relative bias and standard deviations from which parameters are biased; how many are named."""
 
 
 @dataclass(frozen=True)
 class ParameterRow:
-    """A parameter with its values as texts, its change from the declared value,
-    and its description.
-    """
+    """A parameter, its values and its change from the declared value, as texts."""
 
     name: str
     unit: str
@@ -34,17 +31,13 @@ class ParameterRow:
 
 
 def parameter_rows(report: DiagnosisReport, selection: Selection) -> list[ParameterRow]:
-    """Return a row for each parameter of the final model: declared, recalibrated and final value.
-
-    The order is that of the model. A parameter of an effect has `new` as declared value and "" for
-    recalibrated value and change. Values have standard deviations; the description is that of the
-    spec, else of the effect; the note is that of `parameter_note`.
-    """
+    """Return declared, recalibrated and final value of each parameter of the final model."""
     before, after = quantities_of(selection.base), quantities_of(selection.model)
     effect_abouts = {
-        placed_effect.qualified_name(own): entry.text_of("about")
-        for placed_effect in (tried.placed_effect for tried in selection.accepted)
-        for own, entry in _parameter_tables(placed_effect.effect.body)
+        tried.placed_effect.qualified_name(entry.key): entry.node.text_of("about")
+        for tried in selection.accepted
+        for entry in mapping_entries(tried.placed_effect.effect.body.get("parameters"))
+        if isinstance(entry.node, MappingNode)
     }
     coordinates = {one.name: one for one in selection.model.candidate.free_parameters}
     rows = []
@@ -58,28 +51,16 @@ def parameter_rows(report: DiagnosisReport, selection: Selection) -> list[Parame
                 "new" if value is None else f"{value:.5g}",
                 format_with_std(before[name].value, before[name].std) if name in before else "",
                 format_with_std(now.value, now.std),
-                "" if value is None else _format_change(value, now.value),
-                about_of(report, "parameters", name) or effect_abouts.get(name, ""),
+                format_change(value, now.value) if value is not None and value > 0.0 else "",
+                _about_of(report, name) or effect_abouts.get(name, ""),
                 parameter_note(now, coordinates[name]),
             )
         )
     return rows
 
 
-def _parameter_tables(body: MappingNode) -> list[tuple[str, MappingNode]]:
-    """Return the names and tables of the parameters of an effect."""
-    table = body.get("parameters")
-    entries = table if isinstance(table, MappingNode) else ()
-    return [(entry.key, entry.node) for entry in entries if isinstance(entry.node, MappingNode)]
-
-
 def format_biased_parameters(selection: Selection) -> str:
-    """Return how far the recalibration without effects moves parameters from their final values.
-
-    It is `name +12 %, ...`, the largest change first, at most `MAX_BIASED` (5). A parameter is
-    biased from a change of `MIN_BIAS` (3 %) and `MIN_BIAS_STDS` (3) standard deviations on; only
-    positive values count. The text is "" if none is biased.
-    """
+    """Return `name +12 %, ...`: how far the fit without effects moves parameters."""
     before, after = quantities_of(selection.base), quantities_of(selection.model)
     found = []
     for name, one in before.items():
@@ -92,24 +73,15 @@ def format_biased_parameters(selection: Selection) -> str:
     return ", ".join(text for _, text in sorted(found, reverse=True)[:MAX_BIASED])
 
 
-def _format_change(declared: float, current: float) -> str:
-    """Return the relative change of a positive value, else ""."""
-    return format_change(declared, current) if declared > 0.0 else ""
-
-
-def about_of(report: DiagnosisReport, section: str, name: str) -> str:
-    """Return the text of `about` of an entry in a section of the spec; "" if there is none."""
-    table = report.case.document.root.get(section)
+def _about_of(report: DiagnosisReport, name: str) -> str:
+    """Return the text of `about` of a parameter of the spec; "" if there is none."""
+    table = report.case.document.root.get("parameters")
     entry = table.get(name) if isinstance(table, MappingNode) else None
     return entry.text_of("about") if isinstance(entry, MappingNode) else ""
 
 
 def format_fixed_parameters(report: DiagnosisReport) -> list[str]:
-    """Return `name = value` of each real parameter without a range: these are taken as exact.
-
-    Values are in SI with five significant digits, without unit, in the order of the automaton;
-    parameters without a value (tables) are left out.
-    """
+    """Return `name = value` [SI] of each real parameter without a range."""
     return [
         f"{name} = {float(one.value):.5g}"
         for name, one in report.automaton.parameters.items()

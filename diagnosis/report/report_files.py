@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from codegen.toolchain.compiler import BuildError, compiler_version
 from codegen.toolchain.templates import product_version, render_html
 from diagnosis.data_quality.finding import format_findings
 from diagnosis.model.compile_cache import node_text
-from diagnosis.model.equation_change import equation_changes
+from diagnosis.model.effect_library import equation_changes
 from diagnosis.model.placed_effect import shipped_effects
 from diagnosis.report import report_text as sentences, tables
 from diagnosis.report.diagnosis_report import DiagnosisReport, verdict_to_json
@@ -46,21 +46,14 @@ DIGEST_LENGTH = 16
 
 
 def provenance_rows(report: DiagnosisReport) -> list[tuple[str, str, str]]:
-    """Return use, name and digest of spec, map, effects and each recording, in this order.
-
-    Training recordings come before held-out ones. A digest has `DIGEST_LENGTH` (16) hexadecimal
-    digits of SHA-256; that of a map without a file is "".
-    """
+    """Return use, name and digest of spec, map, effects and each recording."""
     case = report.case
     effects = case.effects if case.effects is not None else shipped_effects()
     library = "\n".join(f"{one.name} {node_text(one.body)}" for one in effects)
     columns = "\n".join(case.mapping.span.source.lines)
+    spec = _text_digest(node_text(case.document.root))
     found = [
-        (
-            "spec, with all that it extends",
-            report.name,
-            _text_digest(node_text(case.document.root)),
-        ),
+        ("spec, with all that it extends", report.name, spec),
         ("map of columns", case.mapping.name, _text_digest(columns) if columns else ""),
         ("effects", f"{len(effects)} of them", _text_digest(library)),
     ]
@@ -75,11 +68,7 @@ def _text_digest(text: str) -> str:
 
 
 def tool_versions() -> str:
-    """Return the versions of modewright, Python, numpy, scipy and the C compiler in one line.
-
-    It is `modewright 1.0, Python 3.11.2, numpy 2.1, scipy 1.14, gcc ...`. The last part is the
-    version line of the C compiler, or `no C compiler` if it cannot be started.
-    """
+    """Return `modewright 1.0, Python 3.11.2, numpy 2.1, scipy 1.14, gcc ...`."""
     try:
         compiler = compiler_version().partition(": ")[2]
     except (BuildError, MissingToolError):
@@ -92,10 +81,7 @@ def tool_versions() -> str:
 def report_files(report: DiagnosisReport, variant: str, folder: Path = Path()) -> dict[str, bytes]:
     """Return the contents of all files of a diagnosis by name; `verdict.json` is the last one.
 
-    `variant.yaml`, `report.html` and `verdict.json` are always there; with a diagnosis also
-    `<figure>.svg` and `.png`, `window.csv`, `scenario.yaml`, and the file of a discovered formula.
-    `variant` is the text of the variant file, `folder` the folder that commands on the page name.
-    Nothing is written.
+    `variant` is the text of the variant file, `folder` the one that commands on the page name.
     """
     comparisons = compare_models(report)
     figures = report_figures(report, comparisons) if comparisons else []
@@ -115,12 +101,15 @@ def report_files(report: DiagnosisReport, variant: str, folder: Path = Path()) -
         **_verdict_context(report, comparisons),
         **_model_context(report, comparisons),
         **_data_context(report),
-        **_usage_context(report, folder),
+        "commands": reproduction_commands(report, folder),
+        "made_by": report_command(report, folder),
+        "tools": tool_versions(),
+        "sources": provenance_rows(report),
         "variant": variant,
         "drawings": {one.name: one for one in figures},
         "svg": svg,
     }
-    files["report.html"] = _render_page(context).encode()
+    files["report.html"] = render_html((REPORT,), "report.html.jinja", context).encode()
     verdict = json.dumps(verdict_to_json(report.verdict), indent=2, allow_nan=False) + "\n"
     files["verdict.json"] = verdict.encode()
     return files
@@ -132,6 +121,7 @@ def _verdict_context(
     """Return the values of the template for the verdict, the cards and the changed equations."""
     verdict, found = report.verdict, report.diagnosis
     placed_effects = [one.placed_effect for one in found.selection.accepted] if found else []
+    effects = [one.effect for one in placed_effects]
     return {
         "name": report.name,
         "about": report.case.document.root.text_of("about"),
@@ -142,7 +132,7 @@ def _verdict_context(
         "cards": summary_cards(report, comparisons[0].after if comparisons else ()),
         "location": sentences.format_missing_location(report) if found else "",
         "messages": verdict.messages,
-        "abouts": _effect_summaries(report),
+        "abouts": [(one.name.replace("_", " "), one.about, one.signature) for one in effects],
         "changes": equation_changes(report.case.document, placed_effects),
         "places": tables.location_rows(verdict.location[0]) if verdict.location else [],
         "rivals": [sentences.format_effect(one) for one in verdict.ambiguous_with],
@@ -151,14 +141,6 @@ def _verdict_context(
         if comparisons
         else [],
     }
-
-
-def _effect_summaries(report: DiagnosisReport) -> list[tuple[str, str, str]]:
-    """Return name, description and signature text of each accepted effect."""
-    found = report.diagnosis
-    accepted = found.selection.accepted if found else ()
-    effects = [one.placed_effect.effect for one in accepted]
-    return [(one.name.replace("_", " "), one.about, one.signature) for one in effects]
 
 
 def _model_context(
@@ -200,18 +182,3 @@ def _data_context(report: DiagnosisReport) -> dict[str, Any]:
         "fixed": format_fixed_parameters(report),
         "thresholds": report.case.thresholds,
     }
-
-
-def _usage_context(report: DiagnosisReport, folder: Path) -> dict[str, Any]:
-    """Return the values of the template for commands and provenance."""
-    return {
-        "commands": reproduction_commands(report, folder),
-        "made_by": report_command(report, folder),
-        "tools": tool_versions(),
-        "sources": provenance_rows(report),
-    }
-
-
-def _render_page(context: Mapping[str, Any]) -> str:
-    """Return the HTML page for the values of the template."""
-    return render_html((REPORT,), "report.html.jinja", context)

@@ -2,32 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from diagnosis.criterion.threshold import Thresholds
 from diagnosis.data_quality.finding import format_findings
-from diagnosis.estimation.quantity import Quantity
 from diagnosis.localisation.location_text import PLACE_PHRASES, format_location
 from diagnosis.model.placed_effect import PlacedEffect, place_path
 from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.number_text import format_quantity
-from diagnosis.result.effect_naming import verdict_id
-from diagnosis.result.verdict import NamedEffect
+from diagnosis.result.verdict import NamedEffect, verdict_id
 from diagnosis.selection.candidate_search import MIN_SCREENING_GAIN, CandidateFit
 from diagnosis.selection.forward_selection import Selection
-from diagnosis.validation.misfit import Misfit
+from diagnosis.validation.free_simulation import Misfit
 
 MAX_NAMED = 4
 """Maximum number of rivals, windows or findings in a sentence."""
 
 
 def format_headline(report: DiagnosisReport) -> str:
-    """Return the verdict in one sentence.
-
-    An early end comes first ("Nothing is concluded yet: ..."), then unusable recordings; else the
-    sentence names the effects with their values, the effects that cannot be told apart, the nearest
-    formula or effects for an unknown cause, or the threshold that no effect reached.
-    """
+    """Return the verdict in one sentence."""
     verdict = report.verdict
     if report.end_reason:
         return f"Nothing is concluded yet: {report.end_reason}."
@@ -43,7 +36,9 @@ def format_headline(report: DiagnosisReport) -> str:
             f"it is: {'; '.join(names)}."
         )
     if verdict.verdict == "unknown":
-        like = _format_equation(report) or _format_nearest(report)
+        names = [format_effect(one) for one in verdict.ambiguous_with[:MAX_NAMED]]
+        nearest = f"; the nearest is {' or '.join(names)}" if names else ""
+        like = _format_equation(report) or nearest
         return f"`{report.name}` lacks something that none of the effects tried explains{like}."
     return (
         f"`{report.name}` lacks nothing that these recordings show: with its parameters "
@@ -60,52 +55,28 @@ def _format_equation(report: DiagnosisReport) -> str:
     return f"; it is like `{found.text}` {where}"
 
 
-def _format_nearest(report: DiagnosisReport) -> str:
-    """Return the effects nearest to an unknown cause as the end of a sentence; "" without any."""
-    names = [format_effect(one) for one in report.verdict.ambiguous_with]
-    return f"; the nearest is {' or '.join(names[:MAX_NAMED])}" if names else ""
-
-
 def format_effect(effect: NamedEffect) -> str:
-    """Return an effect with its place in words, such as `viscous friction in the balance of w`.
-
-    Underscores of the name become spaces; the phrases are `PLACE_PHRASES`.
-    """
+    """Return an effect with its place, such as `viscous friction in the balance of w`."""
     section, _, name = effect.place.partition(".")
     return f"{effect.id.replace('_', ' ')} {PLACE_PHRASES[section]} {name}"
 
 
 def _format_effect_values(effect: NamedEffect) -> str:
     """Return an effect with its place and parameter values."""
-    values = ", ".join(
-        f"{name} = {format_fitted_quantity(q)}" for name, q in effect.parameters.items()
-    )
+    values = ", ".join(f"{name} = {format_quantity(q)}" for name, q in effect.parameters.items())
     return f"{format_effect(effect)} ({values})" if values else format_effect(effect)
 
 
-def format_fitted_quantity(fitted: Quantity) -> str:
-    """Return a value with its standard deviation and unit, by `format_quantity`."""
-    return format_quantity(fitted)
-
-
 def format_two_digits(value: float) -> str:
-    """Return a number with two significant digits: `100`, not `1e+02`.
-
-    Below 1e-4 and from 1e6 on it has an exponent.
-    """
+    """Return a number with two significant digits: `100`, not `1e+02`."""
     return f"{float(f'{value:.2g}'):g}"
 
 
 def format_improvement(report: DiagnosisReport) -> str:
-    """Return the misfits of free simulation and the confirmation in one line; "" without a misfit.
-
-    It is "misfit of free simulation, train: w 12 % to 5 %; held out: ... - confirmed"; equal
-    misfits are given once, and the end is "", " - confirmed" or " - not confirmed".
-    """
-    fit = report.verdict.fit
+    """Return the misfits before and after and the confirmation in one line; "" without any."""
     parts = [
         f"{name.replace('_', ' ')}: {_format_misfits(signals)}"
-        for name, signals in fit.items()
+        for name, signals in report.verdict.fit.items()
         if signals
     ]
     if not parts:
@@ -124,10 +95,7 @@ def _format_misfits(signals: Mapping[str, Misfit]) -> str:
 
 
 def format_missing_location(report: DiagnosisReport) -> str:
-    """Return where physics is missing in one sentence, by `format_location`.
-
-    It is "" without a diagnosis and for the verdict `nothing_missing`.
-    """
+    """Return where physics is missing by `format_location`; "" if nothing is."""
     found = report.diagnosis
     if found is None or report.verdict.verdict == "nothing_missing":
         return ""
@@ -135,69 +103,51 @@ def format_missing_location(report: DiagnosisReport) -> str:
 
 
 def format_separation(report: DiagnosisReport) -> list[str]:
-    """Return what would separate the accepted effects from those with which they are confused.
-
-    The first line is the experiment, if there is a plan; then `<name> from <others>: <notes>` for
-    each accepted effect and rival whose file has `confused_with` and `separated_by`. Empty without
-    a diagnosis.
-    """
+    """Return the experiment, and notes of effects, that separate accepted effects from others."""
     if report.diagnosis is None:
         return []
     selection = report.diagnosis.selection
-    lines = [format_experiment(report)] if format_experiment(report) else []
+    lines = [format_experiment(report)]
     for tried in (*selection.accepted, *selection.rivals):
         effect = tried.placed_effect.effect
         if effect.separated_by and effect.confused_with:
             name = verdict_id(tried.placed_effect, report.automaton)
             others = ", ".join(effect.confused_with)
             lines.append(f"{name} from {others}: {'; '.join(effect.separated_by)}")
-    return lines
+    return [line for line in lines if line]
 
 
 def format_oscillation(report: DiagnosisReport) -> str:
-    """Return how long the models follow the largest step, as a sentence.
-
-    The models are the base and, if effects were accepted, the final one. The text is "" without an
-    analysed step, if nothing is missing, or if the base does not oscillate at another frequency
-    after it stops following.
-    """
+    """Return how long base and model follow the largest step; "" if the base follows."""
     found = report.diagnosis.oscillations if report.diagnosis else ()
     if not found or not found[0].has_other_frequency or report.verdict.verdict == "nothing_missing":
         return ""
     text = found[0].format_sentence()
     if len(found) > 1:
-        after = found[1]
-        end = (
-            "to the end"
-            if after.followed_time >= after.length
-            else f"until t = {after.followed_time:.2f} s"
-        )
+        is_whole = found[1].followed_time >= found[1].length
+        end = "to the end" if is_whole else f"until t = {found[1].followed_time:.2f} s"
         text += f"; with what was found it fits {end}"
     return text
 
 
 def format_experiment(report: DiagnosisReport) -> str:
     """Return the experiment to record in one sentence; "" without a plan."""
-    found = report.diagnosis.plan if report.diagnosis else None
-    return found.format_sentence() if found else ""
+    found = report.diagnosis
+    return found.plan.format_sentence() if found and found.plan else ""
 
 
 def format_reason(
     candidate_fit: CandidateFit, rank: int, selection: Selection, thresholds: Thresholds
 ) -> str:
-    """Return why a candidate was accepted or not; `rank` is its index in the table.
-
-    The cases in order: accepted, a rival, not fitted, a gain not above its threshold, nothing
-    accepted, and less than (or for `rank` 0 not needed beside) what was accepted.
-    """
-    ids = {one.placed_effect.id for one in selection.accepted}
-    if candidate_fit.placed_effect.id in ids:
+    """Return why a candidate was accepted or not; `rank` is its index in the table."""
+    own = candidate_fit.placed_effect
+    if own.id in {one.placed_effect.id for one in selection.accepted}:
         return "accepted"
-    if candidate_fit.placed_effect.id in {one.placed_effect.id for one in selection.rivals}:
+    if own.id in {one.placed_effect.id for one in selection.rivals}:
         return "cannot be told from the accepted one"
     if not candidate_fit.is_fitted:
         return f"not fitted: gains less than {MIN_SCREENING_GAIN:g} nats in screening"
-    threshold = thresholds.threshold_of(candidate_fit.placed_effect)
+    threshold = thresholds.threshold_of(own)
     if candidate_fit.gain <= threshold:
         return f"gains less than {threshold:.0f} nats"
     share = f"explains {100.0 * max(candidate_fit.share, 0.0):.0f} % of what is unexplained"
@@ -212,12 +162,9 @@ def candidate_title(placed_effect: PlacedEffect, report: DiagnosisReport) -> str
 
 
 def summary_lines(report: DiagnosisReport) -> list[str]:
-    """Return at most four lines that sum up a report.
+    """Return headline, location, experiment or oscillation, improvement and caveat.
 
-    They are headline, location, experiment or oscillation, improvement and caveat. The third is the
-    experiment for the verdict `ambiguous`, else the oscillation; the caveat is the worst finding
-    that is no note, else the effects that are nearly as good. If there are five, the second and the
-    third one are joined by "; ". Empty lines are left out.
+    There are at most four lines; of five, the second and the third one are joined.
     """
     is_ambiguous = report.verdict.verdict == "ambiguous"
     more = format_experiment(report) if is_ambiguous else format_oscillation(report)
@@ -229,22 +176,14 @@ def summary_lines(report: DiagnosisReport) -> list[str]:
 
 
 def _format_caveat(report: DiagnosisReport) -> str:
-    """Return the worst finding on recordings, or effects that are nearly as good;
-    "" without any.
-    """
+    """Return the worst finding on recordings, else effects nearly as good, else an empty text."""
     worst = format_findings([finding for finding in report.findings if finding.severity != "note"])
     if worst:
         more = f" (and {len(worst) - 1} more)" if len(worst) > 1 else ""
         return f"recordings: {worst[0][1]}{more}"
     verdict = report.verdict
-    if verdict.verdict == "effect" and verdict.ambiguous_with:
-        return (
-            f"nearly as good: {_join_first([format_effect(one) for one in verdict.ambiguous_with])}"
-        )
+    names = [format_effect(one) for one in verdict.ambiguous_with]
+    if verdict.verdict == "effect" and names:
+        more = f" and {len(names) - MAX_NAMED} more" if len(names) > MAX_NAMED else ""
+        return f"nearly as good: {', '.join(names[:MAX_NAMED])}{more}"
     return ""
-
-
-def _join_first(names: Sequence[str]) -> str:
-    """Return the first names, and how many more there are."""
-    more = f" and {len(names) - MAX_NAMED} more" if len(names) > MAX_NAMED else ""
-    return ", ".join(names[:MAX_NAMED]) + more

@@ -21,32 +21,22 @@ SCENARIO = "scenario.yaml"
 
 
 def format_window_csv(window: WorstWindow, inputs: Mapping[str, str]) -> str:
-    """Return a window as CSV in SI: `t_s`, inputs, recorded outputs, and both simulations.
-
-    Simulated columns are `<signal>_without`, then `<signal>_with`. `inputs` are names with units,
-    of which only the names are used. Numbers have nine digits; values that are not finite are
-    blank.
-    """
+    """Return `t_s`, inputs, recorded outputs and both simulations of a window as CSV in SI."""
     seen = window.signals
     names = ["t_s", *inputs, *seen]
     names += [f"{name}_{word}" for word in ("without", "with") for name in seen]
     parts = (window.times[:, None], window.inputs, window.measured, window.before, window.after)
     rows = [
-        ",".join(_format_value(value) for value in row) for row in np.concatenate(parts, axis=1)
+        ",".join(f"{value:.9g}" if math.isfinite(value) else "" for value in row)
+        for row in np.concatenate(parts, axis=1)
     ]
     return "\n".join([",".join(names), *rows]) + "\n"
 
 
-def _format_value(value: float) -> str:
-    """Return a number with nine digits; "" if it is not finite."""
-    return f"{value:.9g}" if math.isfinite(value) else ""
-
-
 def format_scenario(report: DiagnosisReport, window: WorstWindow) -> str:
-    """Return the YAML of a scenario that runs `variant.yaml` through a window's `window.csv`.
+    """Return the YAML of a scenario that runs `variant.yaml` through `window.csv`.
 
-    Its name is that of the automaton with `_window`. Inputs are held between samples, as in C.
-    Compared outputs that are states start at their first recorded value; others have no start.
+    Inputs are held between samples; compared states start at their first recorded value.
     """
     automaton = report.automaton
     fed = {name: format_si_unit(one.unit.dimension) for name, one in automaton.inputs.items()}
@@ -60,11 +50,8 @@ def format_scenario(report: DiagnosisReport, window: WorstWindow) -> str:
         f"  file: {WINDOW}",
         "  time: {column: t_s, unit: s}",
         "  columns:",
-        *(
-            f"    {name}: {{to: {name}, unit: {unit}, hold: previous}}"
-            for name, unit in fed.items()
-        ),
     ]
+    lines += [f"    {n}: {{to: {n}, unit: {unit}, hold: previous}}" for n, unit in fed.items()]
     starts = []
     for name, unit in zip(window.signals, window.units, strict=True):
         lines.append(f"    {name}: {{compare: {name}, unit: {unit}, blank: skip}}")
@@ -76,11 +63,7 @@ def format_scenario(report: DiagnosisReport, window: WorstWindow) -> str:
 
 
 def reproduction_commands(report: DiagnosisReport, folder: Path) -> list[tuple[str, str]]:
-    """Return what can be done with the variant: a description and a shell command each.
-
-    First come copies of effects that the project lacks and `modewright check`; with a diagnosis
-    also simulate, generate, lockstep and explain. Paths are in `folder` and quoted.
-    """
+    """Return a description and a shell command for each use of the variant in `folder`."""
     variant, scenario = (shlex.quote(str(folder / name)) for name in (VARIANT, SCENARIO))
     found = [
         *_effect_copy_commands(report, folder),
@@ -109,10 +92,7 @@ def _effect_copy_commands(report: DiagnosisReport, folder: Path) -> list[tuple[s
 
 
 def report_command(report: DiagnosisReport, folder: Path) -> str:
-    """Return the `modewright diagnose` command that makes this report, quoted for a shell.
-
-    It has the model, `--train` and `--held-out` for each recording, and `--out`; no other options.
-    """
+    """Return the `modewright diagnose` command that makes this report, quoted for a shell."""
     words = ["modewright", "diagnose", report.name]
     for path in report.case.train:
         words += ["--train", str(path)]

@@ -17,18 +17,17 @@ FIGURE_NAMES = (
 
 
 def find_stale_files(folder: Path) -> list[Path]:
-    """Return the existing files of an earlier diagnosis that are not written in every case.
+    """Return the files of an earlier diagnosis in a folder that are not written in every case.
 
-    These are figures (`FIGURE_NAMES`, svg and png), scenario, window, thresholds and formula
-    effects; `verdict.json`, `variant.yaml` and `report.html` are not listed. A folder without a
-    `verdict.json` of the right format has none. All but figures count only if their contents
+    Only a folder with a `verdict.json` has any. All but figures count only if their contents
     identify them; others belong to the user.
     """
     if _json_format(folder / "verdict.json") != VERDICT:
         return []
     found = [folder / f"{name}.{ending}" for name in FIGURE_NAMES for ending in ("svg", "png")]
     found += [folder / name for name, is_ours in OWNERSHIP_CHECKS.items() if is_ours(folder / name)]
-    found += [path for path in sorted(folder.glob("unknown_*_at_*.yaml")) if _is_effect(path)]
+    formulas = sorted(folder.glob("unknown_*_at_*.yaml"))
+    found += [path for path in formulas if f"effect: {path.stem}" in _read_text(path).splitlines()]
     return [path for path in found if path.is_file()]
 
 
@@ -43,20 +42,10 @@ def _is_window(path: Path) -> bool:
     return names[0] == "t_s" and names[-1].endswith("_with")
 
 
-def _is_thresholds(path: Path) -> bool:
-    """Return whether a file has the format of thresholds."""
-    return _json_format(path) == THRESHOLDS
-
-
-def _is_effect(path: Path) -> bool:
-    """Return whether a file is an effect with the name of the file."""
-    return f"effect: {path.stem}" in _read_text(path).splitlines()
-
-
 OWNERSHIP_CHECKS: Mapping[str, Callable[[Path], bool]] = {
     SCENARIO: _is_scenario,
     WINDOW: _is_window,
-    "thresholds.json": _is_thresholds,
+    "thresholds.json": lambda path: _json_format(path) == THRESHOLDS,
 }
 
 

@@ -28,10 +28,9 @@ class Card:
 def summary_cards(
     report: DiagnosisReport, residual_tests: Sequence[WhitenessTest] = ()
 ) -> list[Card]:
-    """Return the cards on location, confidence, improvement and caveats, in this order.
+    """Return the cards on location, confidence, improvement and caveats that have lines.
 
-    `residual_tests` are whiteness tests of the final model; signals rated `coloured` are a caveat.
-    A card without lines is left out. Without a diagnosis there are no cards.
+    `residual_tests` are those of the final model.
     """
     if report.diagnosis is None:
         return []
@@ -75,12 +74,9 @@ def _confidence_card(report: DiagnosisReport, selection: Selection) -> Card:
         lines.append(f"{report.case.thresholds.text} nats are needed")
     else:
         lines.append(f"none of {count}, gains enough")
-        best = max(fitted, key=lambda one: one.gain, default=None)
-        if best is not None:
-            lines += [
-                f"best: {_format_gain(best)}",
-                f"{report.case.thresholds.text} nats are needed",
-            ]
+        if fitted:
+            lines.append(f"best: {_format_gain(max(fitted, key=lambda one: one.gain))}")
+            lines.append(f"{report.case.thresholds.text} nats are needed")
     confirmed = {
         True: "better on recordings that were held out, too",
         False: "not better on recordings that were held out",
@@ -91,10 +87,8 @@ def _confidence_card(report: DiagnosisReport, selection: Selection) -> Card:
 
 def _format_gain(candidate_fit: CandidateFit) -> str:
     """Return the gain and the explained share of a candidate as text."""
-    share = 100.0 * max(candidate_fit.share, 0.0)
-    return (
-        f"{candidate_fit.placed_effect.id}: {candidate_fit.gain:.0f} nats, explains {share:.0f} %"
-    )
+    one, share = candidate_fit, 100.0 * max(candidate_fit.share, 0.0)
+    return f"{one.placed_effect.id}: {one.gain:.0f} nats, explains {share:.0f} %"
 
 
 def _improvement_card(report: DiagnosisReport) -> Card:
@@ -104,12 +98,11 @@ def _improvement_card(report: DiagnosisReport) -> Card:
     lines = []
     has_model = bool(report.diagnosis and report.diagnosis.selection.accepted)
     for name, one in fit.get(part, {}).items():
-        before, after = format_percent(one.nrmse_before), format_percent(one.nrmse_after)
+        line = f"{name}: {format_percent(one.nrmse_before)}"
         if has_model:
             moved = format_change(one.nrmse_before, one.nrmse_after)
-            lines.append(f"{name}: {before} \N{RIGHTWARDS ARROW} {after} ({moved})")
-        else:
-            lines.append(f"{name}: {before}")
+            line += f" \N{RIGHTWARDS ARROW} {format_percent(one.nrmse_after)} ({moved})"
+        lines.append(line)
     title = "How much better" if has_model else "How well it fits"
     words = "held-out" if part == "held_out" else "training"
     return Card(title, (f"misfit of free simulation, {words} recordings", *lines))
@@ -125,12 +118,9 @@ def _caveat_card(report: DiagnosisReport, residual_tests: Sequence[WhitenessTest
     if verdict.verdict == "ambiguous":
         lines.append("more than one effect explains it: see what to record to be sure")
     if verdict.verdict == "effect":
-        rivals = [sentences.format_effect(one) for one in verdict.ambiguous_with]
-        lines.append(
-            f"nearly as good: {', '.join(rivals)}"
-            if rivals
-            else "no rival that was fitted comes close"
-        )
+        rivals = ", ".join(sentences.format_effect(one) for one in verdict.ambiguous_with)
+        nearest = f"nearly as good: {rivals}" if rivals else "no rival that was fitted comes close"
+        lines.append(nearest)
     findings = [text for severity, text in format_findings(report.findings) if severity != "note"]
     lines += [findings[0].replace("`", "")] if findings else ["nothing odd in the recordings"]
     lacking = sum(not one.is_testable for one in report.check.excitation.effects)

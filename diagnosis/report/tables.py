@@ -52,18 +52,15 @@ class FitRow:
 def misfit_rows(report: DiagnosisReport, label: str, dataset: str, runs: FreeRuns) -> list[FitRow]:
     """Return the misfits [SI] of each recording of a set, then a sum row of normalised ones.
 
-    `dataset` is the key of the set in the verdict, `label` its name in words. Changes below
-    `CHANGE_TOLERANCE` (2 %) are the trend `same`.
+    `dataset` is the key of the set in the verdict, `label` its name in words.
     """
     rows = []
     for name, before, after in rms_by_recording(runs):
         pairs = zip(before, after, strict=True)
         cells = tuple(_misfit_cell(float(a), float(b), format_significant) for a, b in pairs)
         rows.append(FitRow(name, label, cells))
-    whole = report.verdict.fit.get(dataset, {})
-    sums = tuple(
-        _misfit_cell(one.nrmse_before, one.nrmse_after, format_percent) for one in whole.values()
-    )
+    whole = report.verdict.fit.get(dataset, {}).values()
+    sums = tuple(_misfit_cell(m.nrmse_before, m.nrmse_after, format_percent) for m in whole)
     return [*rows, FitRow("all together, over the spread of the signal", label, sums, True)]
 
 
@@ -89,11 +86,7 @@ class CandidateRow:
 
 
 def candidate_rows(report: DiagnosisReport, selection: Selection) -> list[CandidateRow]:
-    """Return the rows of fitted candidates: accepted ones, then the others of the first round.
-
-    Candidates that were only screened are left out. A bar is the penalised gain in per cent of the
-    largest one (at least 1 nat); gains are in nats, `diverges` if not finite.
-    """
+    """Return the rows of fitted candidates: accepted ones, then the others of the first round."""
     ids = {one.placed_effect.id for one in selection.accepted}
     first = [one for one in selection.first_round if one.placed_effect.id not in ids]
     listed = [one for one in (*selection.accepted, *first) if one.is_fitted]
@@ -111,20 +104,19 @@ def _candidate_row(
     shares: Mapping[str, float],
 ) -> CandidateRow:
     """Return the row of a candidate at a rank."""
-    share = shares.get(candidate_fit.placed_effect.id)
-    is_accepted = candidate_fit.placed_effect.id in {
-        one.placed_effect.id for one in selection.accepted
-    }
+    own = candidate_fit.placed_effect
+    share = shares.get(own.id)
+    is_accepted = own.id in {one.placed_effect.id for one in selection.accepted}
     reason = sentences.format_reason(candidate_fit, rank, selection, report.case.thresholds)
     if is_accepted and report.verdict.verdict == "ambiguous":
         reason = "best, but not separated from others: applied in the model shown here"
     if is_accepted and report.verdict.verdict == "unknown":
         reason = "a formula, no effect of the library: applied in the model shown here"
-    effect, _, place = sentences.candidate_title(candidate_fit.placed_effect, report).partition("@")
+    effect, _, place = sentences.candidate_title(own, report).partition("@")
     return CandidateRow(
         effect,
         place,
-        _format_nats(candidate_fit.gain),
+        f"{candidate_fit.gain:.0f}" if math.isfinite(candidate_fit.gain) else "diverges",
         f"{100.0 * max(candidate_fit.share, 0.0):.0f} %",
         "" if share is None else format_probability(share),
         100.0 * max(candidate_fit.gain, 0.0) / largest,
@@ -133,19 +125,10 @@ def _candidate_row(
     )
 
 
-def _format_nats(gain: float) -> str:
-    """Return a gain [nats] as an integer, `diverges` if it is not finite."""
-    return f"{gain:.0f}" if math.isfinite(gain) else "diverges"
-
-
 def unfitted_candidates(
     report: DiagnosisReport, selection: Selection
 ) -> list[tuple[str, list[str]]]:
-    """Return the reasons why candidates were not fitted, each with the names of these candidates.
-
-    The names are `name@section.place`. Only candidates of the first round without a gain count;
-    both orders are those of the first round.
-    """
+    """Return the reasons why candidates of the first round were not fitted, with their names."""
     found: dict[str, list[str]] = {}
     ids = {one.placed_effect.id for one in selection.accepted}
     for tried in selection.first_round:
@@ -156,38 +139,22 @@ def unfitted_candidates(
 
 
 def location_rows(location: Location, max_windows: int = MAX_WINDOWS) -> list[tuple[str, str]]:
-    """Return windows, modes and correlates of a location as pairs of heading and text.
-
-    The headings are "strongest in" (the first `max_windows`, and how many more), "by mode" (shares
-    from 0.5 % on, largest first; only for several modes) and "goes along with" (correlations from
-    `MIN_CORRELATION` 0.3 on). Rows without text are left out.
-    """
+    """Return windows, modes and correlates of a location as pairs of heading and text."""
     modes = sorted(location.modes.items(), key=lambda pair: -pair[1])
     shares = [f"{name} {format_percent(share)}" for name, share in modes if share >= 0.005]
     shares = shares if len(modes) > 1 else []
     windows = [f"{file} {start:.2f}-{end:.2f} s" for start, end, file in location.windows]
     more = len(windows) - max_windows
     window_text = ", ".join(windows[:max_windows]) + (f" and {more} more" if more > 0 else "")
-    along = [
-        f"{name} (correlation {r:.2f})"
-        for name, r in location.correlates
-        if abs(r) >= MIN_CORRELATION
-    ]
-    rows = [
-        ("strongest in", window_text),
-        ("by mode", ", ".join(shares)),
-        ("goes along with", ", ".join(along)),
-    ]
-    return [row for row in rows if row[1]]
+    known = [(name, r) for name, r in location.correlates if abs(r) >= MIN_CORRELATION]
+    along = [f"{name} (correlation {r:.2f})" for name, r in known]
+    texts = window_text, ", ".join(shares), ", ".join(along)
+    headings = "strongest in", "by mode", "goes along with"
+    return [row for row in zip(headings, texts, strict=True) if row[1]]
 
 
 def recording_rows(report: DiagnosisReport) -> list[tuple[str, ...]]:
-    """Return name, use, length, rate, lost samples and findings of each checked recording.
-
-    The use is `training` or `not used` (for all without a diagnosis). The rate is a range if
-    channels differ (`50-100 Hz`), lost samples are those of the worst channel, and findings are
-    counts of errors and warnings; both are `none` if there are none.
-    """
+    """Return name, use, length, rate, lost samples and findings of each checked recording."""
     check = report.check
     rows: list[tuple[str, ...]] = []
     for name in dict.fromkeys(one.recording for one in check.channels):
@@ -197,28 +164,16 @@ def recording_rows(report: DiagnosisReport) -> list[tuple[str, ...]]:
         lost = max(one.dropped for one in channels)
         found = [one.severity for one in check.findings if one.recording == name]
         worst = ", ".join(f"{found.count(s)} {s}" for s in ("error", "warning") if s in found)
-        used = "not used" if name in report.unused_recordings else "training"
-        if report.diagnosis is None:
-            used = "not used"
+        is_unused = report.diagnosis is None or name in report.unused_recordings
+        used = "not used" if is_unused else "training"
         rate = "-".join(f"{rate}" for rate in (rates[:1] + rates[1:][-1:]))
-        rows.append(
-            (
-                name,
-                used,
-                f"{length:.1f} s",
-                f"{rate} Hz",
-                format_percent(lost) if lost else "none",
-                worst or "none",
-            )
-        )
+        missing = format_percent(lost) if lost else "none"
+        rows.append((name, used, f"{length:.1f} s", f"{rate} Hz", missing, worst or "none"))
     return rows
 
 
 def untestable_effects(report: DiagnosisReport) -> list[tuple[str, str]]:
-    """Return what recordings lack in words, and the effects that need it, joined by ", ".
-
-    Needs of one effect are joined by " and "; effects with the same needs share an entry.
-    """
+    """Return what recordings lack, each with the effects that need it."""
     lacking: dict[str, list[str]] = {}
     for one in report.check.excitation.effects:
         if one.lacking:
@@ -227,23 +182,14 @@ def untestable_effects(report: DiagnosisReport) -> list[tuple[str, str]]:
 
 
 def format_noise(selection: Selection, signals: Sequence[str], units: Sequence[str]) -> str:
-    """Return the noise of the recorded signals in the base: `w 0.12 rad/s, T 3.0 N*m`.
-
-    It has two significant digits; no model can predict below it.
-    """
-    noise = selection.base.noise_levels.outputs
+    """Return the noise of the recorded signals in the base: `w 0.12 rad/s, T 3.0 N*m`."""
+    noise = [format_significant(float(sd), 2) for sd in selection.base.noise_levels.outputs]
     parts = zip(signals, noise, units, strict=True)
-    return ", ".join(
-        f"{name} {format_significant(float(sd), 2)} {unit}" for name, sd, unit in parts
-    )
+    return ", ".join(f"{name} {sd} {unit}" for name, sd, unit in parts)
 
 
 def split_code_spans(text: str) -> list[tuple[str, bool]]:
-    """Return the parts of a sentence between back quotes, with whether each was quoted.
-
-    The parts alternate, beginning with an unquoted one; parts may be "". A last back quote without
-    a partner also begins a quoted part.
-    """
+    """Return the parts of a sentence between back quotes, with whether each was quoted."""
     return [(part, place % 2 == 1) for place, part in enumerate(text.split("`"))]
 
 
@@ -253,11 +199,9 @@ def whiteness_rows(
     units: Sequence[str],
     is_base_only: bool,
 ) -> list[tuple[str, ...]]:
-    """Return a row of texts for each signal and model, the base first.
+    """Return signal, model, rms, predictable fraction, lags outside, p-value and rating.
 
-    It has signal, model (`recalibrated` with `is_base_only`, else `without` and `with`), rms with
-    unit, predictable fraction, lags outside of all lags (`3 of 60`), p-value (`< 0.001` below that)
-    and rating.
+    There is a row for each signal and model, the base first.
     """
     models = [("recalibrated", before)] if is_base_only else [("without", before), ("with", after)]
     rows: list[tuple[str, ...]] = []
@@ -265,28 +209,17 @@ def whiteness_rows(
         for words, found in models:
             one = found[k]
             chance = "< 0.001" if one.p_value < 0.001 else f"{one.p_value:.2g}"
-            rows.append(
-                (
-                    one.signal,
-                    words,
-                    f"{format_significant(one.rms)} {unit}",
-                    format_percent(one.predictable_fraction),
-                    f"{one.lags_outside_band} of {len(one.lags)}",
-                    chance,
-                    one.rating,
-                )
-            )
+            size = f"{format_significant(one.rms)} {unit}"
+            part = format_percent(one.predictable_fraction)
+            outside = f"{one.lags_outside_band} of {len(one.lags)}"
+            rows.append((one.signal, words, size, part, outside, chance, one.rating))
     return rows
 
 
 def describe_residuals(
     before: Sequence[WhitenessTest], after: Sequence[WhitenessTest], is_base_only: bool
 ) -> list[tuple[str, str]]:
-    """Return for each signal its name and in words what the final model leaves.
-
-    The words give the rating of `after` and its predictable fraction, and that of the base unless
-    `is_base_only`.
-    """
+    """Return each signal with the rating and the predictable fraction of what is left."""
     ratings = {
         "white": "noise",
         "nearly white": "next to nothing but noise",
@@ -295,8 +228,7 @@ def describe_residuals(
     found = []
     for old, new in zip(before, after, strict=True):
         was = "" if is_base_only else f" (without {format_percent(old.predictable_fraction)})"
-        detail = (
-            f"{format_percent(new.predictable_fraction)} of it is predictable from its past{was}"
-        )
-        found.append((new.signal, f"{ratings[new.rating]}; {detail}"))
+        part = f"{format_percent(new.predictable_fraction)} of it"
+        text = f"{ratings[new.rating]}; {part} is predictable from its past{was}"
+        found.append((new.signal, text))
     return found

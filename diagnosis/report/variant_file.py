@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from codegen.toolchain.templates import product_version
 from diagnosis.estimation.covariance import quantities_of
 from diagnosis.estimation.quantity import Quantity
-from diagnosis.model.parameter_text import format_value
+from diagnosis.model.parameter import format_value
 from diagnosis.model.placed_effect import automaton_with_effects
 from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.report_text import format_two_digits
@@ -21,27 +21,20 @@ from language.text.document import MappingNode
 from language.text.node_edit import mapping_entries
 
 NAME_SUFFIX = "_diagnosed"
-
 MAX_NAME_LENGTH = 31
-
 MIN_RELATIVE_CHANGE = 1e-6
 """Relative change below which a parameter is not written."""
 
 
 def variant_name(base: str, suffix: str = NAME_SUFFIX) -> str:
-    """Return a base's name with a suffix; the base is cut so that there are at most 31 characters.
-
-    The limit is `MAX_NAME_LENGTH`; the suffix is never cut.
-    """
+    """Return a base's name, cut so that it has `MAX_NAME_LENGTH` (31) characters with a suffix."""
     return base[: MAX_NAME_LENGTH - len(suffix)] + suffix
 
 
 def format_variant(report: DiagnosisReport, extends: str) -> str:
     """Return the variant as YAML text; `extends` is the name or the file of the base.
 
-    It has the parameters that changed by more than `MIN_RELATIVE_CHANGE` and the accepted effects
-    with their fitted values, in SI; standard deviations and declared values are comments, as are
-    `missing_effect_notes`. Without a diagnosis it has only the header and `about`.
+    It has the changed parameters and the accepted effects in SI, with notes as comments.
     """
     lines = [
         "language: 1",
@@ -60,22 +53,13 @@ def format_variant(report: DiagnosisReport, extends: str) -> str:
 
 
 def missing_effect_notes(report: DiagnosisReport) -> list[str]:
-    """Return a sentence for each of `missing_effects`: its file has to be copied below `spec/`.
-
-    They are without `#`. The variant finds these effects by name.
-    """
-    names = [effect.body.span.source.name for effect in missing_effects(report)]
-    return [
-        f"{name} has to be below spec/: the variant finds this effect by name" for name in names
-    ]
+    """Return a sentence on each of `missing_effects`, which a variant finds by name."""
+    where = "has to be below spec/: the variant finds this effect by name"
+    return [f"{effect.body.span.source.name} {where}" for effect in missing_effects(report)]
 
 
 def missing_effects(report: DiagnosisReport) -> list[Effect]:
-    """Return the accepted effects that the project does not have, or has with another text.
-
-    Empty without a diagnosis. Lines are compared exactly; an effect is there if one of several
-    files with its name is equal.
-    """
+    """Return the accepted effects that the project does not have with the same lines."""
     project = report.case.project
     accepted = report.diagnosis.selection.accepted if report.diagnosis else ()
     found = []
@@ -133,13 +117,11 @@ def _single_effect_lines(
 ) -> list[str]:
     """Return the lines of an effect with its fitted values.
 
-    A parameter per recording has its mean, and the single values as a comment. Values that are
-    multiples of a magnitude and are not fitted are written too: a variant has no recordings.
+    A parameter per recording has its mean. Multiples of a magnitude that are not fitted are written
+    too: a variant has no recordings.
     """
-    placed_effect, own_names = (
-        candidate_fit.placed_effect,
-        added_names(candidate_fit.placed_effect.effect.body),
-    )
+    placed_effect = candidate_fit.placed_effect
+    own_names = added_names(placed_effect.effect.body)
     lines = [f"  {placed_effect.id}:  # {placed_effect.effect.about}"]
     each = [selection.model.values(k) for k in range(len(selection.model.point.per_recording))]
     values = []

@@ -2,36 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from diagnosis.data.array_types import Reals
 from diagnosis.validation.worst_window import WorstWindow
 from engine.results.mode_band import PALETTE
 from engine.results.plot import Picture
 from language.text.sanitise import escape_invisible
 
 BLUE, RED, GREEN, _, _, PURPLE, GREY = PALETTE
-MAX_INPUTS = 3
+INPUT_COLOURS = (GREEN, PURPLE, GREY)
 
 
 def draw_window(window: WorstWindow, inputs: Mapping[str, str], is_base_only: bool) -> Picture:
-    """Draw a window: its varying inputs, and for each signal the values and the errors below.
+    """Draw the varying inputs of one unit, and values and errors of each signal.
 
-    `inputs` are names with units, in the order of the columns; up to `MAX_INPUTS` (3), those in the
-    unit of the first varying one, are drawn. The time under the observer is grey. With
-    `is_base_only` no effect was accepted, so only the base is drawn.
+    `inputs` are names with units; the time under the observer is grey. With `is_base_only` only the
+    base is drawn.
     """
-    driven = _moving_inputs(window, inputs)
+    driven = moving_inputs(window.inputs, inputs)
     count = len(window.signals)
     heights = [1.0] * bool(driven) + [1.7, 1.0] * count
     figure = Figure(figsize=(8.5, 0.9 + 0.82 * sum(heights)), layout="constrained")
     rows = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)
     axes = [row[0] for row in rows]
     if driven:
-        _draw_inputs(axes[0], window, inputs, driven)
+        names, unit = list(inputs), inputs[list(inputs)[driven[0]]]
+        draw_inputs(axes[0], window.times, window.inputs, names, driven)
+        set_ylabel(axes[0], f"{names[driven[0]] if len(driven) == 1 else 'inputs'} [{unit}]", 8)
+        if len(driven) > 1:
+            axes[0].legend(loc="best", fontsize=8)
     for k in range(count):
         first = bool(driven) + 2 * k
         _draw_signal(axes[first], axes[first + 1], window, k, is_base_only)
@@ -40,36 +44,34 @@ def draw_window(window: WorstWindow, inputs: Mapping[str, str], is_base_only: bo
         axis.axvspan(window.times[0], window.free_from, color="#999999", alpha=0.15, lw=0)
         axis.tick_params(labelsize=8)
     axes[bool(driven)].legend(loc="best", fontsize=8)
-    text = escape_invisible(window.title[0].upper() + window.title[1:])
-    axes[0].set_title(text, loc="left", fontsize=10, parse_math=False)
+    set_title(axes[0], window.title[0].upper() + window.title[1:])
     axes[-1].set_xlabel("time [s]; grey: an observer follows, then the model is alone", fontsize=9)
     return Picture(figure)
 
 
-def _moving_inputs(window: WorstWindow, inputs: Mapping[str, str]) -> list[int]:
-    """Return the indices of up to three varying inputs with the unit of the first one."""
-    moving = [k for k in range(len(inputs)) if float(np.ptp(window.inputs[:, k])) > 0.0]
+def set_ylabel(axis: Axes, text: str, fontsize: int = 9) -> None:
+    """Write a text beside an axis, as it is."""
+    axis.set_ylabel(escape_invisible(text), fontsize=fontsize, parse_math=False)
+
+
+def set_title(axis: Axes, text: str, fontsize: int = 10) -> None:
+    """Write a text above an axis, as it is."""
+    axis.set_title(escape_invisible(text), loc="left", fontsize=fontsize, parse_math=False)
+
+
+def moving_inputs(values: Reals, inputs: Mapping[str, str]) -> list[int]:
+    """Return the columns of up to three varying inputs (samples, inputs) with one unit."""
+    moving = [k for k in range(len(inputs)) if float(np.ptp(values[:, k])) > 0.0]
     units = list(inputs.values())
-    return [k for k in moving if units[k] == units[moving[0]]][:MAX_INPUTS]
+    return [k for k in moving if units[k] == units[moving[0]]][: len(INPUT_COLOURS)]
 
 
-def _draw_inputs(
-    axis: Axes, window: WorstWindow, inputs: Mapping[str, str], driven: list[int]
+def draw_inputs(
+    axis: Axes, times: Reals, values: Reals, names: Sequence[str], columns: Sequence[int]
 ) -> None:
-    """Draw inputs over time."""
-    names, units = list(inputs), list(inputs.values())
-    for k, colour in zip(driven, (GREEN, PURPLE, GREY), strict=False):
-        axis.plot(
-            window.times,
-            window.inputs[:, k],
-            color=colour,
-            lw=1.1,
-            label=escape_invisible(names[k]),
-        )
-    text = f"{names[driven[0]] if len(driven) == 1 else 'inputs'} [{units[driven[0]]}]"
-    axis.set_ylabel(escape_invisible(text), fontsize=8, parse_math=False)
-    if len(driven) > 1:
-        axis.legend(loc="best", fontsize=8)
+    """Draw some columns of inputs (samples, inputs) over time."""
+    for k, colour in zip(columns, INPUT_COLOURS, strict=False):
+        axis.plot(times, values[:, k], color=colour, lw=1.1, label=escape_invisible(names[k]))
 
 
 def _draw_signal(
@@ -88,5 +90,5 @@ def _draw_signal(
         beneath.plot(times, measured - values[known, k], style, color=colour, lw=1.1)
     beneath.axhline(0.0, color="black", lw=0.6)
     name, unit = window.signals[k], window.units[k]
-    above.set_ylabel(escape_invisible(f"{name} [{unit}]"), fontsize=9, parse_math=False)
-    beneath.set_ylabel(escape_invisible(f"missed [{unit}]"), fontsize=8, parse_math=False)
+    set_ylabel(above, f"{name} [{unit}]")
+    set_ylabel(beneath, f"missed [{unit}]", 8)

@@ -7,9 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from diagnosis.estimation.covariance import quantities_of
+from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.quantity import Quantity
 from diagnosis.localisation.location import Location
-from diagnosis.validation.misfit import Misfit
+from diagnosis.model.placed_effect import PlacedEffect, effect_names, place_path
+from diagnosis.validation.free_simulation import Misfit
+from language.model.automaton import Automaton
 
 FORMAT = "modewright-verdict/1"
 
@@ -27,9 +31,7 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class RankedCandidate:
-    """A candidate with its probability and its penalised gain [nats],
-    with standard deviation `std`.
-    """
+    """A candidate with its probability and its penalised gain [nats] ± `std`."""
 
     id: str
     place: str
@@ -42,8 +44,7 @@ class RankedCandidate:
 class Verdict:
     """The result of a diagnosis; docs/diagnosis.md describes each part.
 
-    `fit` gives misfits by set (`train`, `held_out`) and signal; `base` gives recalibrated
-    parameters before and after effects were accepted.
+    `fit` gives misfits by set and signal, `base` parameters before and after effects.
     """
 
     verdict: DecisionOutcome
@@ -60,29 +61,14 @@ class Verdict:
     inputs: Mapping[str, str] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
-        """Return the content of `verdict.json` in the format `modewright-verdict/1`.
-
-        Locations without a gain are left out, unless they are accepted; signals, modes and windows
-        are those of the first one that is left. Numbers that are not finite stay as they are.
-        """
-        locations = [
-            location for location in self.location if location.gain > 0.0 or location.is_accepted
-        ]
+        """Return the content of `verdict.json`, with the locations that gain or are accepted."""
+        locations = [one for one in self.location if one.gain > 0.0 or one.is_accepted]
         worst = locations[0] if locations else None
         return {
             "format": FORMAT,
             "verdict": self.verdict,
-            "effects": [_effect_to_json(one) for one in self.effects],
-            "candidates": [
-                {
-                    "id": one.id,
-                    "place": one.place,
-                    "probability": one.probability,
-                    "train_gain": one.train_gain,
-                    "std": one.std,
-                }
-                for one in self.candidates
-            ],
+            "effects": [dataclasses.asdict(one) for one in self.effects],
+            "candidates": [dataclasses.asdict(one) for one in self.candidates],
             "other": self.other,
             "ambiguous_with": [{"id": one.id, "place": one.place} for one in self.ambiguous_with],
             "location": {
@@ -96,7 +82,7 @@ class Verdict:
                 for part, signals in self.fit.items()
             },
             "base": {
-                name: {"before": _quantity_to_json(before), "after": _quantity_to_json(after)}
+                name: {"before": dataclasses.asdict(before), "after": dataclasses.asdict(after)}
                 for name, (before, after) in self.base.items()
             },
             "confirmed": self.confirmed,
@@ -106,15 +92,31 @@ class Verdict:
         }
 
 
-def _effect_to_json(effect: NamedEffect) -> dict[str, Any]:
-    """Return an effect as a JSON object."""
-    return {
-        "id": effect.id,
-        "place": effect.place,
-        "parameters": {name: _quantity_to_json(q) for name, q in effect.parameters.items()},
+VERDICT_ALIASES = {
+    "second_gap": ("backlash", "on an elastic element that has a gap"),
+    "added_inertia": ("compliance", "on an inertia"),
+}
+"""Names of verdicts that differ from the effect's: the effect, and where it has this name."""
+
+
+def verdict_id(placed_effect: PlacedEffect, automaton: Automaton) -> str:
+    """Return the name of an effect in a verdict, which may be a key of `VERDICT_ALIASES`."""
+    element, name = automaton.elements.get(placed_effect.place), placed_effect.effect.name
+    if element is not None and name == "backlash" and "gap" in element.parts:
+        return "second_gap"
+    if element is not None and name == "compliance" and element.kind == "inertia":
+        return "added_inertia"
+    return name
+
+
+def named_effect_of(
+    placed_effect: PlacedEffect, model: Estimate, automaton: Automaton
+) -> NamedEffect:
+    """Return an effect with its fitted parameters, under their names in the effect file."""
+    original_names = effect_names(placed_effect)
+    own = {
+        original_names[name]: quantity
+        for name, quantity in quantities_of(model).items()
+        if name in original_names and name not in automaton.parameters
     }
-
-
-def _quantity_to_json(quantity: Quantity) -> dict[str, Any]:
-    """Return a quantity as a JSON object."""
-    return {"value": quantity.value, "unit": quantity.unit, "std": quantity.std}
+    return NamedEffect(verdict_id(placed_effect, automaton), place_path(placed_effect), own)

@@ -1,7 +1,7 @@
 """Input dependence: whether a disturbance is large while known inputs vary, or near standstill.
 
-An unknown input is independent of known ones. Errors of an actuator, a shaft or a tyre appear when
-known inputs change, and errors of friction near standstill; these are no inputs.
+Errors of an actuator, a shaft or a tyre appear when known inputs change, and errors of friction
+near standstill; an unknown input is independent of both.
 """
 
 from __future__ import annotations
@@ -23,41 +23,39 @@ STANDSTILL_STDS = 0.1
 
 
 def input_dependence(series: Sequence[SampledRecording], disturbances: Sequence[Reals]) -> float:
-    """Return the largest correlation of a disturbance's amplitude with an input's rate or
-    amplitude.
-
-    `disturbances` (samples,) of each recording begin after the burn-in.
-    """
-    pairs = list(zip(series, disturbances, strict=True))
-    columns = range(series[0].inputs.shape[1])
-    return max(
-        (
-            _amplitude_correlation(
-                series, disturbances, [found(one, k, len(u)) for one, u in pairs], within
-            )
-            for k in columns
-            for found in (_input_rate, _input_amplitude)
-            for within in WINDOW_TIMES
-        ),
-        default=0.0,
-    )
+    """Return the largest correlation of an amplitude with an input's rate or amplitude."""
+    correlations = []
+    for k in range(series[0].inputs.shape[1]):
+        inputs = _beside(series, [one.inputs[:, k] for one in series], disturbances)
+        even = [_moving_mean(u, one, SMOOTHING_TIME) for u, one in zip(inputs, series, strict=True)]
+        rates = [np.abs(np.diff(u, prepend=u[:1])) for u in even]
+        for feature in (rates, [np.abs(u) for u in inputs]):
+            for window in WINDOW_TIMES:
+                correlations.append(_amplitude_correlation(series, disturbances, feature, window))
+    return max(correlations, default=0.0)
 
 
 def standstill_dependence(
     series: Sequence[SampledRecording], disturbances: Sequence[Reals]
 ) -> float:
-    """Return the largest correlation of a disturbance's
-    amplitude with an output near standstill.
-    """
+    """Return the largest correlation of an amplitude with an output near standstill."""
     most = 0.0
-    for column in range(series[0].measured.shape[1]):
-        spread = np.nanstd(np.concatenate([one.measured[:, column] for one in series]))
-        near = [
-            _nearness_to_standstill(one, column, len(u), STANDSTILL_STDS * float(spread))
-            for one, u in zip(series, disturbances, strict=True)
-        ]
+    for k in range(series[0].measured.shape[1]):
+        columns = [one.measured[:, k] for one in series]
+        width = max(STANDSTILL_STDS * float(np.nanstd(np.concatenate(columns))), 1e-300)
+        known = [np.nan_to_num(y, nan=np.inf) for y in _beside(series, columns, disturbances)]
+        near = [np.exp(-((y / width) ** 2)) for y in known]
         most = max(most, _amplitude_correlation(series, disturbances, near, WINDOW_TIMES[0]))
     return most
+
+
+def _beside(
+    series: Sequence[SampledRecording], signals: Sequence[Reals], disturbances: Sequence[Reals]
+) -> list[Reals]:
+    """Return signals (samples,) where the disturbances of the recordings are known."""
+    starts = [burn_in_samples(one) for one in series]
+    parts = zip(signals, starts, disturbances, strict=True)
+    return [signal[start : start + len(known)] for signal, start, known in parts]
 
 
 def _amplitude_correlation(
@@ -66,40 +64,14 @@ def _amplitude_correlation(
     features: Sequence[Reals],
     window: float,
 ) -> float:
-    """Return the correlation of an amplitude with a feature, 0 where one of both is constant.
-
-    Both are averaged over a window [reference times] around each sample.
-    """
-    loud = [
-        _moving_mean(np.abs(u), one, window) for u, one in zip(disturbances, series, strict=True)
-    ]
-    near = [_moving_mean(values, one, window) for values, one in zip(features, series, strict=True)]
-    whole, along = np.concatenate(loud), np.concatenate(near)
+    """Return the correlation of moving means of an amplitude and a feature, 0 if constant."""
+    whole, along = (
+        np.concatenate([_moving_mean(u, r, window) for u, r in zip(signals, series, strict=True)])
+        for signals in ([np.abs(u) for u in disturbances], features)
+    )
     if np.std(along) > 0.0 and np.std(whole) > 0.0:
         return float(np.corrcoef(whole, along)[0, 1])
     return 0.0
-
-
-def _nearness_to_standstill(
-    series: SampledRecording, column: int, count: int, width: float
-) -> Reals:
-    """Return 1 where a compared signal is at rest, 0 far from it (count,)."""
-    values = series.measured[burn_in_samples(series) : burn_in_samples(series) + count, column]
-    near = np.exp(-((np.nan_to_num(values, nan=np.inf) / max(width, 1e-300)) ** 2))
-    return np.asarray(near, dtype=np.float64)
-
-
-def _input_rate(series: SampledRecording, column: int, count: int) -> Reals:
-    """Return how much an input moves at each sample (count,)."""
-    values = series.inputs[burn_in_samples(series) : burn_in_samples(series) + count, column]
-    even = _moving_mean(values, series, SMOOTHING_TIME)
-    return np.asarray(np.abs(np.diff(even, prepend=even[:1])), dtype=np.float64)
-
-
-def _input_amplitude(series: SampledRecording, column: int, count: int) -> Reals:
-    """Return how large an input is at each sample (count,)."""
-    values = series.inputs[burn_in_samples(series) : burn_in_samples(series) + count, column]
-    return np.asarray(np.abs(values), dtype=np.float64)
 
 
 def _moving_mean(values: Reals, series: SampledRecording, window: float) -> Reals:

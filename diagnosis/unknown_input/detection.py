@@ -1,7 +1,7 @@
-"""Unknown input: detection of a force or torque that acts in windows, such as a brake or an impact.
+"""Unknown input: a force or torque that acts in windows, such as a brake or an impact.
 
-It is found as a free disturbance in a balance. Because that explains anything without parameters,
-it is accepted only if it is small most of the time and independent of what is known.
+It is found as a free disturbance in a balance. As that explains anything, it must be small most of
+the time and independent of what is known.
 """
 
 from __future__ import annotations
@@ -53,11 +53,9 @@ def detect_unknown_input(
 ) -> tuple[Selection, tuple[Location, ...]]:
     """Return the selection with an unknown input, and the locations with its time course.
 
-    It is tried where the model with the accepted effects leaves more than an ordinary disturbance:
-    at the balances whose free disturbances gain most. It is not tried where an effect explains more
-    than half of what is left: that is no independent input. It comes first if no effect was
-    accepted, else behind the effects. Both arguments are returned if the disturbance does not act
-    in windows.
+    It is tried at the balances whose free disturbances gain most, if more than an ordinary
+    disturbance is left and no effect explains half of that. Both arguments are returned if the
+    disturbance does not act in windows.
     """
     effects = _unknown_input_effects(model_set)
     explained = max((one.share for one in selection.last.candidates if one.gain > 0.0), default=0.0)
@@ -84,9 +82,7 @@ def detect_unknown_input(
 def _find_place(
     model_set: ModelSet, locations: Sequence[Location], effects: Mapping[str, PlacedEffect]
 ) -> Location | None:
-    """Return the first balance of those with nearly the largest gain whose disturbance acts in
-    windows, smoothed; None if there is none.
-    """
+    """Return the first balance of nearly the largest gain with an unknown input, smoothed."""
     most = max((one.gain for one in locations), default=0.0)
     for one in locations:
         if one.path in effects and one.gain > NEAR_BEST_FRACTION * most:
@@ -111,10 +107,10 @@ def _is_unknown_input(model_set: ModelSet, location: Location) -> bool:
 def _refit_on_inactive_intervals(
     model_set: ModelSet, location: Location, free_model: Estimate
 ) -> Location:
-    """Return a location with a model whose parameters are fitted where the input does not act.
+    """Return a location with parameters fitted where the input does not act.
 
-    The intervals are first those outside the largest values, then those without a significant
-    value, if that costs less. The standard deviation is at least the size in inactive intervals.
+    The intervals are those outside the largest values, then those without a significant value, if
+    that costs less. The standard deviation is at least the size in inactive intervals.
     """
     least = _energy_level([one.values for one in location.disturbances])
     is_inactive = [np.abs(one.values) < least for one in location.disturbances]
@@ -158,9 +154,9 @@ def _unknown_input_effects(model_set: ModelSet) -> dict[str, PlacedEffect]:
     """Return, by path, the inputs without parameters that the library knows for balances."""
     balances = {drift.place for drift in model_set.disturbances}
     return {
-        f"flow.{placed_effect.place}": placed_effect
+        f"flow.{one.place}": one
         for effect in model_set.effects
         if effect.body.get("parameters") is None
-        for placed_effect in find_placements(model_set.document, effect)
-        if placed_effect.place in balances
+        for one in find_placements(model_set.document, effect)
+        if one.place in balances
     }

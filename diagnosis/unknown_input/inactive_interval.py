@@ -1,7 +1,6 @@
 """Inactive intervals: parameters estimated where an unknown input does not act.
 
-An input that is free everywhere also absorbs the error of a wrong mass or drag. In the
-intervals in which the input is inactive, the model must follow without it.
+An input that is free everywhere also absorbs the error of a wrong mass or drag.
 """
 
 from __future__ import annotations
@@ -37,10 +36,10 @@ MIN_INACTIVE_FRACTION = 1.0 / 3.0
 def refit_on_inactive_intervals(
     model: Estimate, series: Sequence[SampledRecording], active: Sequence[Booleans], name: str
 ) -> Estimate:
-    """Return a model with the disturbance `name` free and parameters from its inactive intervals.
+    """Return a model with the disturbance `name` free, fitted on its inactive intervals.
 
-    `active` (samples,) of each recording after its burn-in marks where the input acts. The model is
-    returned unchanged if the inactive intervals are too short.
+    `active` (samples,) of each recording begins after its burn-in. The model is returned unchanged
+    if the intervals are too short.
     """
     pieces, places = _inactive_recordings(series, active)
     if sum(one.count for one in pieces) < MIN_INACTIVE_FRACTION * sum(one.count for one in series):
@@ -60,10 +59,7 @@ def refit_on_inactive_intervals(
 def _inactive_recordings(
     series: Sequence[SampledRecording], active: Sequence[Booleans]
 ) -> tuple[list[SampledRecording], list[int]]:
-    """Return the inactive intervals as recordings, the longest first, and whose part each is.
-
-    The second list contains the index of the recording of each interval.
-    """
+    """Return inactive intervals, the longest first, and the index of their recordings."""
     found = []
     for r, (one, there) in enumerate(zip(series, active, strict=True)):
         around = np.ones(2 * one.sample_count(MARGIN) + 1)

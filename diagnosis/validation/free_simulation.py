@@ -1,14 +1,14 @@
 """Free simulation: the error of a model without corrections, before and after a diagnosis.
 
-An observer corrects the model for one second, then it runs freely for one and a half. The error
-there is normalised by the standard deviation of the recorded signal. A model with fading memory
-runs freely for the whole recording after the burn-in.
+An observer corrects the model for one second, then it runs freely for one and a half. A model with
+fading memory runs freely after the burn-in.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,6 @@ from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.data.stacked_recordings import burn_in_samples
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.innovations import predict
-from diagnosis.validation.misfit import Misfit
 
 OBSERVED_TIME = 5.0
 """Reference times of a recording with corrections by the observer."""
@@ -30,10 +29,7 @@ WINDOW_TIME = OBSERVED_TIME + FREE_TIME
 def compare_misfits(
     before: Estimate, after: Estimate, series: Sequence[SampledRecording]
 ) -> dict[str, Misfit]:
-    """Return the misfit of each compared output for two models that are fitted to `series`.
-
-    The misfits are those of `nrmse`, and times the standard deviation of the output in SI.
-    """
+    """Return the misfit by `nrmse` and in SI of each output for two models fitted to `series`."""
     first, second = nrmse(before, series), nrmse(after, series)
     names = before.candidate.predictor.outputs
     return {
@@ -43,11 +39,9 @@ def compare_misfits(
 
 
 def nrmse(model: Estimate, series: Sequence[SampledRecording]) -> Reals:
-    """Return the root mean square error of free simulation over the standard deviation (outputs,).
+    """Return the error of free simulation over the standard deviation (outputs,), 0 if unknown.
 
-    Only known values in the free parts (`is_free`) of all recordings count; for a model with the
-    output-error criterion all after the burn-in. Values of a run that diverged do not count; an
-    output without values has 0.
+    Known values in free parts count; with the output-error criterion all after the burn-in.
     """
     return _nrmse_of(model, series, simulate_free(model, series))
 
@@ -63,7 +57,8 @@ def _nrmse_of(model: Estimate, series: Sequence[SampledRecording], runs: Sequenc
     """Return the `nrmse` of simulated outputs, (samples, outputs) of each recording."""
     squares, counts = [], []
     for one, simulated in zip(series, runs, strict=True):
-        counted = is_after_burn_in(one) if model.noise_levels.is_output_error else is_free(one)
+        after_burn_in = np.arange(one.count) >= burn_in_samples(one)
+        counted = after_burn_in if model.noise_levels.is_output_error else is_free(one)
         alone = counted[:, None] & np.isfinite(one.measured) & np.isfinite(simulated)
         error = np.where(alone, one.measured - simulated, 0.0)
         squares.append(np.sum(error**2, axis=0))
@@ -73,10 +68,7 @@ def _nrmse_of(model: Estimate, series: Sequence[SampledRecording], runs: Sequenc
 
 
 def output_stds(series: Sequence[SampledRecording]) -> Reals:
-    """Return the standard deviation [SI] of each compared output over all recordings (outputs,).
-
-    NaN is ignored; the result is at least 1e-12.
-    """
+    """Return the standard deviation [SI] of each output (outputs,), at least 1e-12."""
     spread = np.nanstd(np.concatenate([one.measured for one in series]), axis=0)
     return np.asarray(np.maximum(spread, 1e-12), dtype=np.float64)
 
@@ -84,33 +76,29 @@ def output_stds(series: Sequence[SampledRecording]) -> Reals:
 def simulate_free(model: Estimate, series: Sequence[SampledRecording]) -> list[Reals]:
     """Return the outputs of a model, observed and free in turn, (samples, outputs) each.
 
-    An observer corrects the model for `OBSERVED_TIME` (5 reference times), then it runs freely for
-    `FREE_TIME` (7.5 reference times). The samples after a run diverged are NaN.
+    Samples after a run diverged are NaN.
     """
+    measured = [np.where(is_free(one)[:, None], np.nan, one.measured) for one in series]
     masked = [
-        dataclasses.replace(one, measured=np.where(is_free(one)[:, None], np.nan, one.measured))
-        for one in series
+        dataclasses.replace(one, measured=np.ascontiguousarray(known))
+        for one, known in zip(series, measured, strict=True)
     ]
     values = [model.values(k) for k in range(len(series))]
-    masked = [
-        dataclasses.replace(one, measured=np.ascontiguousarray(one.measured)) for one in masked
-    ]
-    prediction = predict(
-        model.candidate, masked, values, model.gains, model.noise_levels.huber_limits
-    )
-    return [p.outputs for p in prediction.predictions]
-
-
-def is_after_burn_in(series: SampledRecording) -> NDArray[np.bool_]:
-    """Return the mask (samples,) of samples after the burn-in."""
-    return np.asarray(np.arange(series.count) >= burn_in_samples(series))
+    run = predict(model.candidate, masked, values, model.gains, model.noise_levels.huber_limits)
+    return [one.outputs for one in run.predictions]
 
 
 def is_free(series: SampledRecording) -> NDArray[np.bool_]:
-    """Return the mask (samples,) of samples in free simulation.
-
-    These are the last `FREE_TIME` of each period of `OBSERVED_TIME` + `FREE_TIME` from the first
-    sample on.
-    """
+    """Return the mask (samples,) of the last `FREE_TIME` of each `WINDOW_TIME`."""
     observed, whole = series.sample_count(OBSERVED_TIME), series.sample_count(WINDOW_TIME)
     return np.asarray(np.mod(np.arange(series.count), whole) >= observed)
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """Errors of free simulation before and after, over the signal's deviation and in SI."""
+
+    nrmse_before: float
+    nrmse_after: float
+    rmse_before: float
+    rmse_after: float

@@ -1,8 +1,4 @@
-"""Driveline oscillation (shuffle): frequency and damping after the largest step, cycle by cycle.
-
-The recorded oscillation is compared with the simulated one, and the time for which the model
-follows it is determined.
-"""
+"""Driveline oscillation (shuffle): frequency and damping after the largest step, cycle by cycle."""
 
 from __future__ import annotations
 
@@ -42,12 +38,7 @@ FREQUENCY_TOLERANCE = 0.02
 
 @dataclass(frozen=True)
 class Cycles:
-    """The cycles of an oscillation:
-
-    `times` [s] after the step, `frequencies` [Hz] and `amplitudes`.
-
-    A cycle begins at every zero crossing, so consecutive cycles overlap by a half.
-    """
+    """Half-overlapping cycles: `times` [s] after the step, `frequencies` [Hz] and `amplitudes`."""
 
     times: Reals
     frequencies: Reals
@@ -59,26 +50,16 @@ class Cycles:
         return float(np.mean(late)) if len(late) else float("nan")
 
     def frequency_trend(self) -> float:
-        """Return the mean frequency of small cycles over that of large ones, minus 1.
-
-        It is NaN without small or without large cycles. Small is below `SMALL_AMPLITUDE` (0.25) of
-        the largest amplitude, large is above `LARGE_AMPLITUDE` (0.5).
-        """
+        """Return the mean frequency of small cycles over that of large ones, minus 1, or NaN."""
         part = self.amplitudes / max(float(np.max(self.amplitudes, initial=0.0)), 1e-300)
-        large, little = (
-            self.frequencies[part > LARGE_AMPLITUDE],
-            self.frequencies[part < SMALL_AMPLITUDE],
-        )
+        large = self.frequencies[part > LARGE_AMPLITUDE]
+        little = self.frequencies[part < SMALL_AMPLITUDE]
         if not len(large) or not len(little):
             return float("nan")
         return float(np.mean(little) / np.mean(large) - 1.0)
 
     def damping_ratio(self) -> float:
-        """Return the damping ratio from the logarithmic decrement; NaN for fewer than three cycles.
-
-        The decrement is the slope of a line through the logarithms of all amplitudes; cycles are
-        half a period apart. Negative if the oscillation grows.
-        """
+        """Return the damping ratio from the logarithmic decrement; NaN below three cycles."""
         if len(self.amplitudes) < 3:
             return float("nan")
         slope = np.polyfit(np.arange(len(self.amplitudes)), np.log(self.amplitudes), 1)[0]
@@ -87,11 +68,7 @@ class Cycles:
 
 @dataclass(frozen=True)
 class Oscillation:
-    """The oscillation after the step at `start` [s] of a recording.
-
-    `signal` is the output with the clearest oscillation. The model follows it for `followed_time`
-    [s] of `length` [s].
-    """
+    """The clearest oscillation after a step at `start` [s], and how long [s] a model follows."""
 
     recording: str
     start: float
@@ -103,11 +80,7 @@ class Oscillation:
 
     @property
     def has_other_frequency(self) -> bool:
-        """Whether the model stops following, and then has another frequency.
-
-        The mean frequencies of the cycles after `followed_time` must be known and differ by more
-        than `FREQUENCY_TOLERANCE` (2 %).
-        """
+        """Whether the frequency is another one after the model stops following."""
         rates = [
             one.mean_frequency_after(self.followed_time) for one in (self.recorded, self.simulated)
         ]
@@ -115,13 +88,7 @@ class Oscillation:
         return bool(known and abs(rates[0] / rates[1] - 1.0) > FREQUENCY_TOLERANCE)
 
     def format_sentence(self) -> str:
-        """Return in one sentence how long the model follows, and both frequencies after that.
-
-        It is "w fits to the end, 2.50 s after the step at 1.00 s of a.csv", or "w fits until t =
-        0.40 s after ..., then the shuffle's frequency is 3.10 Hz in the recording and 3.40 Hz in
-        the model", without frequencies if one is unknown. The trends with amplitude follow if they
-        differ by `FREQUENCY_TOLERANCE`, the damping ratios if they differ by 0.5 %.
-        """
+        """Return how long the model follows, and frequencies, trends and damping after that."""
         begin = f"after the step at {self.start:.2f} s of {self.recording}"
         if self.followed_time >= self.length:
             return f"{self.signal} fits to the end, {self.length:.2f} s {begin}"
@@ -136,9 +103,7 @@ class Oscillation:
         return text + self._format_trend() + self._format_damping()
 
     def _format_trend(self) -> str:
-        """Return the trend of frequency with amplitude, recorded and simulated;
-        "" if they agree.
-        """
+        """Return both trends of frequency with amplitude; "" if they agree."""
         more = [one.frequency_trend() for one in (self.recorded, self.simulated)]
         if not all(np.isfinite(more)) or abs(more[0] - more[1]) < FREQUENCY_TOLERANCE:
             return ""
@@ -155,13 +120,11 @@ class Oscillation:
 
 
 def analyse_oscillation(model: Estimate, series: Sequence[SampledRecording]) -> Oscillation | None:
-    """Return the oscillation after the largest step of some recordings, recorded and simulated.
+    """Return the oscillation after the largest step, recorded and simulated freely.
 
-    The model is corrected before the step and free after it, for at most `MAX_TIME` (2.5 s). The
-    signal is the output with the largest oscillation relative to its noise. The model follows until
-    two samples in a row have an error above `MAX_ERROR_FRACTION` (0.35) of the amplitude and
-    `MIN_NOISE_RATIO` (8) times the noise. The result is None without a step, at least two clear
-    cycles in both, or a complete run.
+    The model follows until two samples in a row have an error above `MAX_ERROR_FRACTION` of the
+    amplitude and `MIN_NOISE_RATIO` times the noise. None without a step, two clear cycles in both,
+    or a complete run.
     """
     place = _largest_step(series)
     if place is None:
@@ -202,10 +165,7 @@ def analyse_oscillation(model: Estimate, series: Sequence[SampledRecording]) -> 
 
 
 def _largest_step(series: Sequence[SampledRecording]) -> tuple[int, int, int] | None:
-    """Return recording, sample, and end sample of the largest input step relative to its range.
-
-    The end is the next large step, the end of the recording, or `MAX_TIME` after the step.
-    """
+    """Return recording, sample and end of the largest input step relative to the input's range."""
     scale = np.max([np.ptp(one.inputs, axis=0) for one in series], axis=0)
     scale = np.where(scale > 0.0, scale, np.inf)
     best, found = 0.0, None
@@ -225,10 +185,7 @@ def _largest_step(series: Sequence[SampledRecording]) -> tuple[int, int, int] | 
 
 
 def _cycle_samples(values: Reals, period: float) -> int | None:
-    """Return the number of samples of one cycle of the strongest oscillation.
-
-    None without one, and for a simulation that diverged.
-    """
+    """Return the samples of a cycle of the strongest oscillation; None without one."""
     if len(values) <= TREND_DEGREE or not np.all(np.isfinite(values)):
         return None
     time = np.arange(len(values))

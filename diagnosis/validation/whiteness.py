@@ -1,7 +1,4 @@
-"""Whiteness: the autocorrelation of the innovations of a model (Ljung, Box 1978).
-
-Autocorrelated innovations show that the model lacks something that was recorded.
-"""
+"""Whiteness: the autocorrelation of the innovations of a model (Ljung, Box 1978)."""
 
 from __future__ import annotations
 
@@ -27,10 +24,9 @@ SIGNIFICANCE_LEVEL = 0.01
 
 @dataclass(frozen=True)
 class WhitenessTest:
-    """The test of one signal: `correlations` at `lags` [s] (lags,), and the 99 % `band`.
+    """Autocorrelations at `lags` [s] with their 99 % band, and the Ljung-Box test of a signal.
 
-    `p_value` is that of the Ljung-Box test, `predictable_fraction` the fraction of the variance
-    that a linear predictor explains, `rms` the size [SI] of the innovations.
+    `predictable_fraction` is the variance that a linear predictor explains; `rms` is in SI.
     """
 
     signal: str
@@ -48,11 +44,7 @@ class WhitenessTest:
 
     @property
     def rating(self) -> str:
-        """The result in words: `white`, `nearly white` or `coloured`.
-
-        It is `white` if `is_white`, else `nearly white` below a predictable fraction of
-        `NEGLIGIBLE_FRACTION` (0.05).
-        """
+        """`white`, else `nearly white` below `NEGLIGIBLE_FRACTION` (0.05), else `coloured`."""
         if self.is_white:
             return "white"
         return "nearly white" if self.predictable_fraction < NEGLIGIBLE_FRACTION else "coloured"
@@ -64,11 +56,7 @@ class WhitenessTest:
 
 
 def innovation_whiteness(model: Estimate, period: float) -> list[WhitenessTest]:
-    """Return the Ljung-Box test of the innovations of each compared output, in their order.
-
-    `period` is the time [s] between samples. Innovations after the burn-in are used, clipped at the
-    Huber limits.
-    """
+    """Return the test of each output's innovations after burn-in; `period` in s."""
     prediction = model.prediction
     names = model.candidate.predictor.outputs
     found = []
@@ -82,10 +70,8 @@ def innovation_whiteness(model: Estimate, period: float) -> list[WhitenessTest]:
 def ljung_box(name: str, parts: Sequence[Reals], period: float) -> WhitenessTest:
     """Return the test of a signal given in parts, NaN where unknown; `period` [s].
 
-    The statistic is the sum over lags of the number of pairs times the squared autocorrelation; it
-    has a chi-squared distribution with as many degrees of freedom as lags. The lags reach to
-    `MAX_LAGS` (50) samples or a quarter of the shortest part, whichever is less, but there is one
-    at least. The mean is not subtracted.
+    The sum over lags of pairs times squared autocorrelation (mean not subtracted) is chi-squared.
+    The lags reach to `MAX_LAGS` (50) or a quarter of the shortest part, but there is one at least.
     """
     shortest = min(len(part) for part in parts)
     count = max(1, min(MAX_LAGS, shortest // 4))
@@ -113,10 +99,6 @@ def ljung_box(name: str, parts: Sequence[Reals], period: float) -> WhitenessTest
 
 
 def _predictable_fraction(r: Reals) -> float:
-    """Return the fraction of the variance that the linear predictor of this order explains.
-
-    `r` are biased autocorrelations (over the number of all values), so the Toeplitz matrix is
-    positive definite (Yule-Walker equations).
-    """
+    """Return the variance that Yule-Walker explains for biased autocorrelations `r` (lags,)."""
     weights = solve_toeplitz(np.concatenate([[1.0], r[:-1]]), r)
     return float(np.clip(weights @ r, 0.0, 1.0))

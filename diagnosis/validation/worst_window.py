@@ -15,11 +15,9 @@ from diagnosis.validation.free_simulation import OBSERVED_TIME, WINDOW_TIME, is_
 
 @dataclass(frozen=True)
 class WorstWindow:
-    """A window of a recording: times [s] (n,), `inputs` (n, inputs) and outputs (n, outputs) in SI.
+    """A window: times [s] (n,), `inputs` (n, inputs) and outputs (n, outputs) in SI.
 
-    `before` and `after` are the outputs of the base and the model, which run freely from
-    `free_from` [s]. `units` are those of the signals; `title` names the recordings of which it is
-    the worst.
+    Base (`before`) and model (`after`) run freely from `free_from` [s].
     """
 
     recording: str
@@ -36,10 +34,7 @@ class WorstWindow:
 
 @dataclass(frozen=True)
 class FreeRuns:
-    """Outputs [SI] of recordings by two models, observed and free in turn.
-
-    Each has the shape (samples, outputs).
-    """
+    """Outputs [SI] of recordings by two models, observed and free, (samples, outputs) each."""
 
     series: Sequence[SampledRecording]
     before: Sequence[Reals]
@@ -56,10 +51,7 @@ def simulate_free_runs(
 
 
 def rms_by_recording(runs: FreeRuns) -> list[tuple[str, Reals, Reals]]:
-    """Return name and root mean square errors [SI] of each recording, before and after (outputs,).
-
-    Only known values in the free parts (`is_free`) count; an output without any has NaN.
-    """
+    """Return name and errors [SI] of free parts, before and after (outputs,), or NaN."""
     found = []
     for one, before, after in zip(runs.series, runs.before, runs.after, strict=True):
         alone = is_free(one)
@@ -71,31 +63,29 @@ def rms_by_recording(runs: FreeRuns) -> list[tuple[str, Reals, Reals]]:
 def find_worst_window(runs: FreeRuns, units: Sequence[str], label: str) -> WorstWindow:
     """Return the window with the largest sum of normalised squared errors of the base.
 
-    Windows are `WINDOW_TIME` (12.5 reference times) long and adjacent, the last one of a recording
-    may be shorter; only errors after `OBSERVED_TIME` count, over the standard deviation of the
-    signal in all recordings. The first of equal windows is taken. `label` names the set of
-    recordings in the title, `units` are those of the signals.
+    Windows are adjacent and `WINDOW_TIME` long; errors after `OBSERVED_TIME` count. `label` names
+    the set of recordings in the title.
     """
     series, before, after = runs.series, runs.before, runs.after
     spread = np.nanstd(np.concatenate([one.measured for one in series]), axis=0)
     scale = np.maximum(spread, 1e-12)
-    most, place = -1.0, (0, 0)
-    for k, one in enumerate(series):
-        for start in _window_starts(one):
-            window = _window_slice(one, start)
-            alone = slice(start + one.sample_count(OBSERVED_TIME), window.stop)
-            missed = (one.measured[alone] - before[k][alone]) / scale
+    most, k, window = -1.0, 0, slice(0)
+    for r, one in enumerate(series):
+        observed, whole = one.sample_count(OBSERVED_TIME), one.sample_count(WINDOW_TIME)
+        for start in range(0, max(1, one.count - observed - 1), whole):
+            end = min(one.count, start + whole)
+            alone = slice(start + observed, end)
+            missed = (one.measured[alone] - before[r][alone]) / scale
             squares = float(np.nansum(missed**2))
             if squares > most:
-                most, place = squares, (k, start)
-    k, start = place
-    one, window = series[k], _window_slice(series[k], start)
+                most, k, window = squares, r, slice(start, end)
+    one = series[k]
     period = float(one.period)
     times = float(one.start) + np.arange(window.start, window.stop) * period
     return WorstWindow(
         one.name,
         f"worst window of the {label} recordings: {one.name}, {times[0]:.4g} to {times[-1]:.4g} s",
-        float(one.start) + (start + one.sample_count(OBSERVED_TIME)) * period,
+        float(one.start) + (window.start + one.sample_count(OBSERVED_TIME)) * period,
         times,
         one.inputs[window],
         one.measured[window],
@@ -104,14 +94,3 @@ def find_worst_window(runs: FreeRuns, units: Sequence[str], label: str) -> Worst
         runs.signals,
         tuple(units),
     )
-
-
-def _window_starts(series: SampledRecording) -> range:
-    """Return the first samples of the windows that contain free simulation."""
-    last = max(1, series.count - series.sample_count(OBSERVED_TIME) - 1)
-    return range(0, last, series.sample_count(WINDOW_TIME))
-
-
-def _window_slice(series: SampledRecording, start: int) -> slice:
-    """Return the samples of the window at a start."""
-    return slice(start, min(series.count, start + series.sample_count(WINDOW_TIME)))

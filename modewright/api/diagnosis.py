@@ -19,14 +19,18 @@ from diagnosis.data.holdout import require_disjoint
 from diagnosis.data.recording_names import recording_names
 from diagnosis.data_quality.finding import format_findings
 from diagnosis.data_quality.recording_check import used_columns
-from diagnosis.model.effect_folder import explain_unplaceable, load_effects
-from diagnosis.model.effect_library import library_effects
+from diagnosis.model.effect_library import explain_unplaceable, library_effects, load_effects
 from diagnosis.pipeline.diagnose import diagnose as run_diagnosis
 from diagnosis.pipeline.diagnosis_case import Case, file_digests
 from diagnosis.pipeline.parameter_fit import Fit, fit as fit_case
 from diagnosis.pipeline.usable_recordings import LazyRecordings, select_usable
-from diagnosis.report.diagnosis_report import DiagnosisReport, undecided_verdict, unusable_reasons
-from diagnosis.report.negative_fit_signals import unfollowed_signals, withdraw_nothing_missing
+from diagnosis.report.diagnosis_report import (
+    DiagnosisReport,
+    undecided_verdict,
+    unfollowed_signals,
+    unusable_reasons,
+    withdraw_nothing_missing,
+)
 from diagnosis.report.report_text import summary_lines
 from diagnosis.report.stale_files import find_stale_files
 from diagnosis.report.variant_file import format_variant, missing_effect_notes

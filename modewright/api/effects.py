@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, NoReturn
 
 from diagnosis.model.effect_library import EffectDescription, describe_effect, library_effects
-from diagnosis.result.effect_naming import VERDICT_ALIASES
+from diagnosis.result.verdict import VERDICT_ALIASES
 from language.loading.load import automaton_of
 from language.overlays.expand_document import Project, expand_document, read_document
 from language.text.arguments import PathText, optional, to_project, to_text

@@ -7,7 +7,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from diagnosis.model.parameter_text import in_unit
+from diagnosis.model.parameter import in_unit
 from diagnosis.pipeline.parameter_fit import STRONG_CORRELATION, Fit
 from diagnosis.report.diagnosis_report import DiagnosisReport, replace_non_finite
 from diagnosis.report.report_text import format_two_digits, summary_lines

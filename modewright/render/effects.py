@@ -9,10 +9,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from diagnosis.model.effect_library import EffectDescription, format_place_kinds
-from diagnosis.model.equation_change import EquationChange
+from diagnosis.model.effect_library import EffectDescription, EquationChange, format_place_kinds
 from diagnosis.model.placed_effect import place_path
-from diagnosis.result.effect_naming import VERDICT_ALIASES
+from diagnosis.result.verdict import VERDICT_ALIASES
 
 
 def print_effects(screen: Console, effects: Sequence[EffectDescription], at: str | None) -> None:

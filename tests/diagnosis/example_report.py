@@ -22,8 +22,7 @@ from diagnosis.model.placed_effect import PlacedEffect, automaton_with_effects, 
 from diagnosis.pipeline.diagnose import Diagnosis
 from diagnosis.pipeline.diagnosis_case import Case
 from diagnosis.report.diagnosis_report import DiagnosisReport
-from diagnosis.result.effect_naming import named_effect_of
-from diagnosis.result.verdict import Verdict
+from diagnosis.result.verdict import Verdict, named_effect_of
 from diagnosis.selection.candidate_search import CandidateFit
 from diagnosis.selection.comparison import Round
 from diagnosis.selection.forward_selection import Selection

@@ -57,7 +57,7 @@ def test_a_held_input_may_have_its_only_sample_before_all_others() -> None:
 @pytest.mark.parametrize("count", [0, 1])
 def test_signals_without_samples_in_common_are_not_compared(count: int) -> None:
     nothing = np.zeros(count)
-    assert compare_signals("run", "y", OutputComparison("y", nothing, nothing, nothing)) is None
+    assert compare_signals("run", "y", OutputComparison(nothing, nothing, nothing)) is None
 
 
 def test_a_diagnosis_that_is_wanted_anyway_is_refused_at_the_file(

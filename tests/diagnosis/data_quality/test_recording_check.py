@@ -222,7 +222,7 @@ def test_a_piece_of_any_length_is_compared() -> None:
         times: Values = np.asarray(np.arange(count) * 0.01, dtype=np.float64)
         speed: Values = np.sin(3.0 * times) + 0.01 * np.cumsum(np.sin(times))
         late = np.roll(speed, 30)
-        found = compare_signals("short", "w", OutputComparison("w", times, late, speed))
+        found = compare_signals("short", "w", OutputComparison(times, late, speed))
         assert found is None or 0.2 < found.gain < 5.0
 
 

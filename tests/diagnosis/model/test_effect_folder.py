@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from diagnosis.model.effect_folder import explain_unplaceable, load_effects
+from diagnosis.model.effect_library import explain_unplaceable, load_effects
 from language.overlays.expand_document import Project, expand_document, read_document
 from language.text.diagnostic import SpecError
 

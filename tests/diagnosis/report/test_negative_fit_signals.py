@@ -7,9 +7,9 @@ import math
 
 import pytest
 
-from diagnosis.report.negative_fit_signals import unfollowed_signals, withdraw_nothing_missing
+from diagnosis.report.diagnosis_report import unfollowed_signals, withdraw_nothing_missing
 from diagnosis.result.verdict import DecisionOutcome, NamedEffect, Verdict
-from diagnosis.validation.misfit import Misfit
+from diagnosis.validation.free_simulation import Misfit
 
 
 def verdict(says: DecisionOutcome, nrmse: float) -> Verdict:

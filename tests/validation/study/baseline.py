@@ -18,7 +18,7 @@ from diagnosis.data.stacked_recordings import burn_in_samples
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.pipeline.diagnose import Diagnosis
-from diagnosis.result.effect_naming import verdict_id
+from diagnosis.result.verdict import verdict_id
 from diagnosis.validation.free_simulation import nrmse
 
 Reals = NDArray[np.float64]

@@ -6,7 +6,7 @@ from typing import Any
 
 from diagnosis.model.placed_effect import effect_names, place_path
 from diagnosis.pipeline.diagnose import Diagnosis
-from diagnosis.result.effect_naming import verdict_id
+from diagnosis.result.verdict import verdict_id
 from diagnosis.selection.candidate_search import CandidateFit
 from language.model.automaton import Automaton
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from diagnosis.model.parameter_text import format_value
+from diagnosis.model.parameter import format_value
 from language.loading.load import load_automaton
 from language.model.automaton import Automaton
 from language.overlays.expand_document import Project
