@@ -93,16 +93,15 @@ class DisturbanceResponse:
     def innovations(self, predictions: Sequence[Prediction]) -> list[Reals]:
         """Return the innovations of the compared outputs from predictions, (samples, outputs) each.
 
-        The burn-in of the first recording is cut off each; element torques and disturbance are left
-        out.
+        The burn-in of each recording is cut off; element torques and disturbance are left out.
         """
         return self._after_burn_in([one.innovations for one in predictions])
 
     def _after_burn_in(self, innovations: Sequence[Reals]) -> list[Reals]:
         """Return the part of innovations after the burn-in, for the compared outputs."""
         seen = len(self.model.candidate.predictor.outputs)
-        skip = burn_in_samples(self.series[0])
-        return [one[skip:, :seen] for one in innovations]
+        pairs = zip(innovations, self.series, strict=True)
+        return [values[burn_in_samples(one) :, :seen] for values, one in pairs]
 
 
 def build_disturbance_response(

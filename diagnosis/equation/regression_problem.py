@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -48,8 +48,8 @@ def regression_at(
     runs = probe.predict(zero_disturbance)
     before = probe.innovations(runs)
     weigh = _HuberWeights(model, before)
-    signals = _formula_signals(model_set, probe, runs)
     output = place_bindings(model_set, section, place).get("y", "") if section == "outputs" else ""
+    signals = _formula_signals(model_set, probe, runs, {output: place} if output else {})
     terms = tuple(generate_terms(signals, section, output))
     model = model if model.jacobian else with_normal_equations(model, model_set.series)
     parameters = _parameter_responses(model, weigh)
@@ -117,9 +117,15 @@ def _parameter_responses(model: Estimate, weights: _HuberWeights) -> tuple[Reals
 
 
 def _formula_signals(
-    model_set: ModelSet, response: DisturbanceResponse, runs: Sequence[Prediction]
+    model_set: ModelSet,
+    response: DisturbanceResponse,
+    runs: Sequence[Prediction],
+    sources: Mapping[str, str],
 ) -> Signals:
-    """Return the signals that formulas may read: states, inputs, element torques and twists."""
+    """Return the signals that formulas may read: states, inputs, element torques and twists.
+
+    `sources` gives the compared output that has the values of a further name, such as an equation.
+    """
     predictor = response.candidate.predictor
     known = TreeTypes(model_set.document.root)
     values: dict[str, list[Reals]] = {}
@@ -131,6 +137,9 @@ def _formula_signals(
     for name in response.element_torques:
         column = predictor.outputs.index(name)
         values[name] = [one.outputs[:, column] for one in runs]
+    for name, output in sources.items():
+        column = predictor.outputs.index(output)
+        values.setdefault(name, [one.outputs[:, column] for one in runs])
     stretches = []
     for name, element in model_set.automaton.elements.items():
         if element.kind == "elastic":
