@@ -83,13 +83,21 @@ parameters:
   curve: {table: {over: u, points: {-1: 0, 0: 1, 2: 4}}}
 inputs: {u: {unit: "1", range: [-99, 99]}}
 states: {x: {unit: "1", initial: 1, range: [-99, 99]}}
-flow: {x: "1 s * der(x) = -gain * x + (if u > x then 1 else lookup(curve, u))"}
+flow: {x: "1 s * der(x) = -gain * x + pull"}
+initial: low
+modes:
+  low:
+    equations: {pull: "0 + lookup(curve, u)"}
+    transitions: {high: {when: u > 1}}
+  high:
+    equations: {pull: "0 + u"}
+    transitions: {low: {when: u < -2}}
 outputs: [x]
 """
 
 
-def test_a_table_that_is_read_under_a_condition_is_no_vector() -> None:
-    """The recordings are followed one after the other."""
+def test_a_table_that_one_mode_reads_is_no_vector() -> None:
+    """The other mode is followed in vectors."""
     made = program(TABLE_TEXT)
     columns = columns_of(made, ("x",))
     page = np.array(list(columns.page.values()))

@@ -1,4 +1,4 @@
-"""The regression for a formula holds for recordings of unlike length and for outputs of equations."""
+"""The search for a formula holds for recordings of unlike length and for outputs of equations."""
 
 from __future__ import annotations
 
