@@ -48,6 +48,10 @@ Hold = Literal["previous", "linear"] | None
 """Behaviour of an input between samples; None if it is not known."""
 
 
+class UnusableRecordingError(ValueError):
+    """A recording to which no model can be fitted: too few samples, or the model diverges on it."""
+
+
 @dataclass(frozen=True)
 class SampledRecording:
     """A recording on a uniform grid: `inputs` (samples, inputs) and `measured` (samples, outputs).
@@ -170,7 +174,7 @@ def sample_recording(
     ]
     short = next((channel for channel in used if len(channel.times) < 2), None)
     if short is not None:
-        raise ValueError(f"{recording.name}: `{short.column.name}` has one sample only")
+        raise UnusableRecordingError(f"{recording.name}: `{short.column.name}` has one sample only")
     end = min(channel.times[-1] for channel in used)
     start = _first_common_stamp(
         [output_channels[name] for name in output_names if name in output_channels], used
@@ -178,13 +182,10 @@ def sample_recording(
     step = period or min(grid_period(channel.times) for channel in used)
     count = int((end - start) / step + MAX_SLIP) + 1
     if count < 2:
-        raise ValueError(f"{recording.name}: only {count} samples in common")
-    input_values = np.stack(
-        [
-            _sample_input(input_channels.get(name), start, step, count, defaults, name)
-            for name in inputs
-        ]
-    )
+        raise UnusableRecordingError(f"{recording.name}: only {max(count, 0)} samples in common")
+    input_values = np.empty((len(inputs), count))
+    for row, name in zip(input_values, inputs, strict=True):
+        row[:] = _sample_input(input_channels.get(name), start, step, count, defaults, name)
     output_values = np.stack(
         [_sample_output(output_channels.get(name), start, step, count) for name in output_names]
     )
@@ -320,11 +321,11 @@ def decimate(
     factor = max(1, int(longest / series.period))
     count = series.count // factor
     if count == 0:
-        raise ValueError(
+        raise UnusableRecordingError(
             f"{series.name}: only {series.count} samples, {factor} are averaged to one"
         )
     recorded = series.inputs[: count * factor]
-    inputs = np.mean(recorded.reshape(count, factor, -1), axis=1)
+    inputs = np.mean(recorded.reshape(count, factor, recorded.shape[1]), axis=1)
     linear = np.flatnonzero(series.linear_inputs)
     if len(linear) and factor > 1:
         around = np.pad(recorded[:, linear], ((factor // 2, factor // 2), (0, 0)), mode="edge")

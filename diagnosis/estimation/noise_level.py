@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.data.sampled_recording import SampledRecording, UnusableRecordingError
 from diagnosis.estimation.innovations import measured_noise_levels
 from diagnosis.estimation.operating_point import linearise_near, operating_points
 from diagnosis.model.candidate import Candidate
@@ -30,15 +30,17 @@ def disturbance_units(
 
     One unit changes some output by its measured noise after the median reference time, by the model
     linearised at the start of the first recording (at most 1e12 for a disturbance without
-    response). `start` are values [SI] of parameters. Raises ValueError if the model cannot be
-    linearised there.
+    response). `start` are values [SI] of parameters. Raises UnusableRecordingError if the
+    model cannot be linearised there.
     """
     output_noise = measured_noise_levels(series, {}).outputs
     mode, operating_point = next(iter(operating_points(candidate, series, None).items()))
     page = candidate.calibration_page(start, series[0])
     linear = linearise_near(candidate, page, mode, operating_point.states, operating_point.inputs)
     if linear is None:
-        raise ValueError("the base is unstable where the first recording starts")
+        raise UnusableRecordingError(
+            f"{series[0].name}: the model is unstable where this recording starts"
+        )
     count = round(float(np.median([one.sample_count(1.0) for one in series])))
     ahead = linear.c @ np.linalg.matrix_power(linear.phi, count)
     units = {}
