@@ -105,7 +105,7 @@ def _weighted_response(
 
 def _parameter_responses(model: Estimate, weights: _HuberWeights) -> tuple[Reals, ...]:
     """Return the weighted decrease of innovations per coordinate (samples * outputs,
-    parameters).
+    parameters), of each recording.
     """
     columns = [
         weights.weight_and_flatten(
@@ -113,6 +113,8 @@ def _parameter_responses(model: Estimate, weights: _HuberWeights) -> tuple[Reals
         )
         for name in model.candidate.names
     ]
+    if not columns:
+        return tuple(np.empty((weight.size, 0)) for weight in weights.weights)
     return tuple(np.stack(one, axis=1) for one in zip(*columns, strict=True))
 
 

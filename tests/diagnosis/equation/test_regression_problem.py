@@ -35,10 +35,9 @@ COUNTS = 240, 60
 """Samples of the recordings; the burn-in of the shorter one is shorter."""
 
 
-@pytest.fixture(scope="module")
-def fitted() -> tuple[ModelSet, Estimate]:
+def fit_block(text: str) -> tuple[ModelSet, Estimate]:
     """The block with recordings that its model does not explain, and the fit of its base."""
-    document = parse_document(Source("block.yaml", tuple(SPEC.splitlines())), SPEC)
+    document = parse_document(Source("block.yaml", tuple(text.splitlines())), text)
     project, chance = Project(Path()), np.random.default_rng(3)
     series = []
     for count in COUNTS:
@@ -56,6 +55,11 @@ def fitted() -> tuple[ModelSet, Estimate]:
     return fit_base(build_model_set(case, automaton, series, ("v", "F_c")))
 
 
+@pytest.fixture(scope="module")
+def fitted() -> tuple[ModelSet, Estimate]:
+    return fit_block(SPEC)
+
+
 @pytest.mark.parametrize(("section", "place"), [("flow", "v"), ("outputs", "F_c")])
 def test_each_recording_has_its_own_burn_in(
     fitted: tuple[ModelSet, Estimate], section: str, place: str
@@ -67,3 +71,10 @@ def test_each_recording_has_its_own_burn_in(
     assert any(place in term.name for term in found.terms)
     rows = [2 * (count - skipped) for count, skipped in zip(COUNTS, burn_in, strict=True)]
     assert [part.stop - part.start for part in base.prediction.slices] == [n // 2 for n in rows]
+
+
+def test_a_model_without_free_parameters_has_terms_only() -> None:
+    fixed = SPEC.replace(", range: [1, 4]", "").replace(", range: [1, 9]", "")
+    found = regression_at(*fit_block(fixed), "flow", "v")
+    assert found.problem.parameters == 0
+    assert found.columns[0].places == (0,)

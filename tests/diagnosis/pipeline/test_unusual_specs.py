@@ -51,6 +51,13 @@ initial: run
 modes: {{run: {{update: {{x: 0.9 * x}}}}}}
 outputs: [x]
 """
+STATELESS = f"""\
+{HEAD}step: 5 ms
+parameters: {{k: {{value: 10 N/m, range: [5, 20]}}}}
+inputs: {{x_0: {{unit: m}}}}
+equations: {{F: k * x_0}}
+outputs: [F]
+"""
 MAP = """\
 language: 1
 map: block_columns
@@ -85,6 +92,18 @@ def test_a_spec_without_inputs_is_diagnosed() -> None:
     assert found.diagnosis.model_set.series[0].inputs.shape[1] == 0
     head = Path("found/window.csv").read_text().splitlines()
     assert any(line.startswith("t_s,x") for line in head)
+
+
+def test_a_spec_without_states_is_fitted() -> None:
+    spec = write_spec(STATELESS)
+    columns = "{x_m: {to: x_0, unit: m}, F_N: {compare: F, unit: N}}"
+    Path("map.yaml").write_text(MAP.replace("{x_m: {compare: x, unit: m}}", columns))
+    chance = np.random.default_rng(4)
+    rows = [f"{k / 100:.2f},{x:.5f},{12.0 * x:.5f}" for k, x in enumerate(chance.normal(size=99))]
+    Path("run.csv").write_text("\n".join(["t_s,x_m,F_N", *rows]) + "\n")
+    assert mw.check_recordings(["run.csv"], "map.yaml", spec).check.channels
+    found = mw.fit(spec, ["run.csv"], map="map.yaml", anyway=True)
+    assert found.parameters[0].quantity.value == pytest.approx(12.0, rel=0.01)
 
 
 def test_a_sampled_spec_is_refused() -> None:
