@@ -156,8 +156,8 @@ class VectorEmitter:
                 parts = ", ".join(self.emit_expression(part) for part in (condition, then, other))
                 return f"CHOSEN{'_TRUTH' if self.kind_of(then) == 'truth' else ''}({parts})"
             case Call(function, arguments):
-                self.called_functions[function] = len(arguments)
                 parts = ", ".join(self.emit_expression(argument) for argument in arguments)
+                self.called_functions[function] = len(arguments)
                 return f"each_{function}({parts})"
         raise NotVectorisable
 

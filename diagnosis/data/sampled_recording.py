@@ -46,6 +46,10 @@ Hold = Literal["previous", "linear"] | None
 """Behaviour of an input between samples; None if it is not known."""
 
 
+class UnusableRecordingError(ValueError):
+    """A recording to which no model can be fitted: too few samples, or the model diverges on it."""
+
+
 @dataclass(frozen=True)
 class SampledRecording:
     """A recording on a uniform grid: `inputs` (samples, inputs) and `measured` (samples, outputs).
@@ -162,7 +166,7 @@ def sample_recording(
     used = [*driven.values(), *compared]
     short = next((channel for channel in used if len(channel.times) < 2), None)
     if short is not None:
-        raise ValueError(f"{recording.name}: `{short.column.name}` has one sample only")
+        raise UnusableRecordingError(f"{recording.name}: `{short.column.name}` has one sample only")
     end = min(channel.times[-1] for channel in used)
     common = max(channel.times[0] for channel in used)
     fastest = min(compared, key=lambda channel: grid_period(channel.times))
@@ -170,7 +174,7 @@ def sample_recording(
     step = min(grid_period(channel.times) for channel in used)
     count = int((end - start) / step + MAX_SLIP) + 1
     if count < 2:
-        raise ValueError(f"{recording.name}: only {count} samples in common")
+        raise UnusableRecordingError(f"{recording.name}: only {max(count, 0)} samples in common")
     columns = [
         _sample_input(driven[name], start, step, count)
         if name in driven
@@ -298,11 +302,11 @@ def decimate(
     factor = max(1, int(longest / series.period))
     count = series.count // factor
     if count == 0:
-        raise ValueError(
+        raise UnusableRecordingError(
             f"{series.name}: only {series.count} samples, {factor} are averaged to one"
         )
     recorded = series.inputs[: count * factor]
-    inputs = np.mean(recorded.reshape(count, factor, -1), axis=1)
+    inputs = np.mean(recorded.reshape(count, factor, recorded.shape[1]), axis=1)
     linear = np.flatnonzero(series.linear_inputs)
     if len(linear) and factor > 1:
         around = np.pad(recorded[:, linear], ((factor // 2, factor // 2), (0, 0)), mode="edge")

@@ -99,9 +99,24 @@ def most_excited_piece(piece: Recording, max_length: Fraction) -> Recording:
     if piece.end - piece.start <= max_length:
         return piece
     count = int(2 * (piece.end - piece.start) / max_length)
-    starts = [piece.start + k * max_length / 2 for k in range(count)]
+    starts = [
+        piece.start + k * max_length / 2 for k in _places_with_samples(piece, max_length, count)
+    ]
     best = max(starts, key=lambda start: _excitation_level(piece, start, start + max_length))
     return crop(piece, (best, min(piece.end, best + max_length)))
+
+
+def _places_with_samples(piece: Recording, length: Fraction, count: int) -> list[int]:
+    """Return the numbers, below `count`, of parts that may have samples, and the first part.
+
+    Parts are as in `most_excited_piece`. The number of parts of a recording whose time leaps has no
+    bound, the number of those with samples has one.
+    """
+    found = {0}
+    for channel in piece.channels.values():
+        places = np.floor((channel.seconds - float(piece.start)) / (0.5 * float(length)))
+        found |= {int(k) + near for k in np.unique(places) for near in (-1, 0, 1)}
+    return sorted(k for k in found if 0 <= k < count)
 
 
 def _decimate_inputs(piece: Recording) -> Recording:

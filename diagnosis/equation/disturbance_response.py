@@ -78,8 +78,8 @@ class DisturbanceResponse:
     def after_burn_in(self, innovations: Sequence[Reals]) -> list[Reals]:
         """Return the innovations of compared outputs after burn-in, (samples, outputs) each."""
         seen = len(self.model.candidate.predictor.outputs)
-        skip = burn_in_samples(self.series[0])
-        return [one[skip:, :seen] for one in innovations]
+        pairs = zip(innovations, self.series, strict=True)
+        return [values[burn_in_samples(one) :, :seen] for values, one in pairs]
 
 
 def build_disturbance_response(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -46,8 +46,8 @@ def regression_at(
     runs = probe.predict(zero_disturbance)
     before = probe.after_burn_in([one.innovations for one in runs])
     weigh = _HuberWeights(model, before)
-    signals = _formula_signals(model_set, probe, runs)
     output = place_bindings(model_set, section, place).get("y", "") if section == "outputs" else ""
+    signals = _formula_signals(model_set, probe, runs, {output: place} if output else {})
     terms = tuple(generate_terms(signals, section, output))
     model = model if model.jacobian else with_normal_equations(model, model_set.series)
     parameters = _parameter_responses(model, weigh)
@@ -102,13 +102,21 @@ def _parameter_responses(model: Estimate, weights: _HuberWeights) -> tuple[Reals
         weights.weight_and_flatten([-model.jacobian[name][part] for part in slices])
         for name in model.candidate.names
     ]
+    if not columns:
+        return tuple(np.empty((weight.size, 0)) for weight in weights.weights)
     return tuple(np.stack(one, axis=1) for one in zip(*columns, strict=True))
 
 
 def _formula_signals(
-    model_set: ModelSet, response: DisturbanceResponse, runs: Sequence[Prediction]
+    model_set: ModelSet,
+    response: DisturbanceResponse,
+    runs: Sequence[Prediction],
+    sources: Mapping[str, str],
 ) -> Signals:
-    """Return the signals that formulas may read: states, inputs, element torques and twists."""
+    """Return the signals that formulas may read: states, inputs, element torques and twists.
+
+    `sources` gives the compared output that has the values of a further name, such as an equation.
+    """
     predictor, automaton = response.candidate.predictor, model_set.automaton
     known = TreeTypes(model_set.document.root)
     values: dict[str, list[Reals]] = {}
@@ -120,6 +128,9 @@ def _formula_signals(
     for name in response.element_torques:
         column = predictor.outputs.index(name)
         values[name] = [one.outputs[:, column] for one in runs]
+    for name, output in sources.items():
+        column = predictor.outputs.index(output)
+        values.setdefault(name, [one.outputs[:, column] for one in runs])
     stretches = []
     for name, element in automaton.elements.items():
         if element.kind == "elastic":

@@ -65,7 +65,7 @@ def _pseudoinverse(matrix: Reals) -> Reals:
     bit-identical to `numpy.linalg.pinv` in half its time.
     """
     left, sizes, right = np.linalg.svd(matrix, full_matrices=False)
-    large = sizes > RCOND * sizes[0]
+    large = sizes > RCOND * np.max(sizes, initial=0.0)
     inverse = np.divide(1.0, sizes, out=np.zeros_like(sizes), where=large)
     found: Reals = right.T @ (inverse[:, None] * left.T)
     return found

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.data.sampled_recording import SampledRecording, UnusableRecordingError
 from diagnosis.estimation.innovations import measured_noise_levels
 from diagnosis.estimation.operating_point import linearise_near, operating_points
 from diagnosis.model.candidate import Candidate
@@ -31,7 +31,7 @@ def disturbance_units(
     One unit changes some output by its measured noise after the median reference time, by the model
     linearised at the start of a recording; of several recordings it is the median. It is at most
     1e12 for a disturbance without response. `start` are values [SI] of parameters. Raises
-    ValueError if the model cannot be linearised at the start of any recording.
+    UnusableRecordingError if the model cannot be linearised at the start of any recording.
     """
     output_noise = measured_noise_levels(series, {}).outputs
     count = round(float(np.median([one.sample_count(1.0) for one in series])))
@@ -44,7 +44,7 @@ def disturbance_units(
             ahead = linear.c @ np.linalg.matrix_power(linear.phi, count)
             responses.append(np.max(np.abs(ahead) / output_noise[:, np.newaxis], axis=0))
     if not responses:
-        raise ValueError("the base is unstable where the recordings start")
+        raise UnusableRecordingError("the model is unstable where the recordings start")
     response = np.median(responses, axis=0)
     units = {}
     for name in candidate.disturbance_states:

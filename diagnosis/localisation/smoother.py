@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.data.array_types import Reals
-from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.data.sampled_recording import SampledRecording, UnusableRecordingError
 from diagnosis.estimation.estimate import Estimate
 from diagnosis.estimation.kalman_gain import LocalModel, local_models
 
@@ -61,13 +61,13 @@ def smooth_states(estimate: Estimate, series: Sequence[SampledRecording]) -> lis
     """Return the smoothed states of each recording to which a model was fitted.
 
     The standard deviations are scaled by the mean normalised square of innovations over
-    `AVERAGING_TIME`, where that exceeds 1. Raises ValueError if the model is unstable in every
-    mode.
+    `AVERAGING_TIME`, where that exceeds 1. Samples after a run diverged are left out. Raises
+    UnusableRecordingError if the model is unstable in every mode.
     """
     candidate, noise_levels = estimate.candidate, estimate.noise_levels
     locals_ = local_models(candidate, series, estimate.values(0), noise_levels, estimate.prediction)
     if not locals_:
-        raise ValueError("the model is unstable in every mode")
+        raise UnusableRecordingError(f"{series[0].name}: the model is unstable in every mode")
     steps = _smoother_input(estimate, locals_)
     start = next(iter(locals_.values())).initial_std
     after, spread, ratios = smooth_deviations(steps, start, noise_levels.outputs**2)

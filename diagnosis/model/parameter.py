@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from language.expressions.parser import parse_expression
+from language.expressions.units import Unit
 from language.lowering.constants import evaluate_exactly
 from language.model.automaton import Automaton
 from language.model.declaration import Formula, Parameter

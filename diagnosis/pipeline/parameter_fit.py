@@ -104,10 +104,11 @@ def fit(
 
     No effects are placed, and the better one of the two holds of inputs is used. The misfits
     compare the declared with the fitted parameters. Raises SpecError (also for a name that is
-    unknown or has no range), ValueError (no compared output, no free parameter) and
-    MissingToolError.
+    unknown or has no range, and without a parameter that has a range), ValueError (no compared
+    output, unusable recordings) and MissingToolError.
     """
     automaton = automaton_of(case.document, case.project)
+    _require_free_parameter(automaton)
     if parameters is not None:
         document = restrict_free_parameters(case.document, automaton, parameters)
         case = dataclasses.replace(case, document=document)
@@ -120,8 +121,6 @@ def fit(
         [one for path in case.train for one in read_series(path, case, automaton, seen)]
     )
     model_set, estimate = fit_base(build_model_set(case, automaton, series, seen), log)
-    if not estimate.candidate.free_parameters:
-        raise ValueError(f"no parameter of `{automaton.name}` has a `range` to be fitted in")
     start = vector_of(estimate.candidate, len(model_set.series), {})
     declared = evaluate(estimate.candidate, model_set.series, estimate.noise_levels, start)
     return Fit(
@@ -132,6 +131,15 @@ def fit(
         file_digests(case, case.train),
         estimate,
     )
+
+
+def _require_free_parameter(automaton: Automaton) -> None:
+    """Raise SpecError, at the place of the spec, if no parameter can be fitted."""
+    problems = Problems()
+    if not any(map(_can_be_fitted, automaton.parameters.values())):
+        label = f"no parameter of `{automaton.name}` has a range to be fitted in"
+        problems.error("range", automaton.span, label, "`range: [low, high]` beside its value")
+    problems.raise_if_errors()
 
 
 def restrict_free_parameters(

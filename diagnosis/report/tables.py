@@ -65,8 +65,9 @@ def misfit_rows(report: DiagnosisReport, label: str, dataset: str, runs: FreeRun
 
 
 def _misfit_cell(before: float, after: float, text: Callable[[float], str]) -> Cell:
-    """Return the cell of a misfit; `text` formats its values."""
-    part = after / before - 1.0 if before > 0.0 else 0.0
+    """Return the cell of a misfit; `text` formats its values. An unknown change is no trend."""
+    is_known = before > 0.0 and math.isfinite(after)
+    part = after / before - 1.0 if is_known else 0.0
     trend = "same" if abs(part) < CHANGE_TOLERANCE else "better" if part < 0.0 else "worse"
     return Cell(text(before), text(after), format_change(before, after), trend)
 

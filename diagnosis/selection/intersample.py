@@ -12,7 +12,12 @@ from functools import partial
 
 import numpy as np
 
-from diagnosis.data.sampled_recording import SampledRecording, open_holds, resample
+from diagnosis.data.sampled_recording import (
+    SampledRecording,
+    UnusableRecordingError,
+    open_holds,
+    resample,
+)
 from diagnosis.estimation.estimate import Estimate, with_best_gain_scale
 from diagnosis.estimation.initial_input import average_initial_inputs, choose_initial_inputs
 from diagnosis.estimation.innovations import measured_noise_levels
@@ -34,7 +39,7 @@ def fit_base(model_set: ModelSet, log: LogCallback = lambda text: None) -> Fitte
     `ORDINARY_LEVEL` (0.1 units); these levels are held. Inputs without a known hold are linear or
     constant between samples, whichever costs less with the best free disturbance of a balance.
     Huber limits are `HUBER_STDS` (4) robust standard deviations of the innovations of a first fit
-    without limits. Raises ValueError if the model cannot be linearised.
+    without limits. Raises UnusableRecordingError if the model cannot be linearised or diverges.
     """
     by_hold = [_fit_with_hold(model_set, is_linear) for is_linear in open_holds(model_set.series)]
     paced, first = min(by_hold, key=_flexible_cost)
@@ -46,8 +51,20 @@ def fit_base(model_set: ModelSet, log: LogCallback = lambda text: None) -> Fitte
     if base.noise_levels.gain_scale < 1.0:
         again = partial(refine, base, paced.series)
         base = paced.load_or_fit("scaled base", base.candidate, [base.point, base.gains], again)
+    if not np.isfinite(base.cost):
+        raise UnusableRecordingError(_describe_divergence(paced, base))
     log(f"base fitted, {_describe_holds(paced)}: {base.cost:.0f} nats")
     return with_scales(paced, base), base
+
+
+def _describe_divergence(model_set: ModelSet, base: Estimate) -> str:
+    """Return on which recording a model diverges first, and when, in words."""
+    name, runs = model_set.automaton.name, base.prediction.predictions
+    for one, run in zip(model_set.series, runs, strict=True):
+        if run.completed < one.count:
+            time = float(one.start + run.completed * one.period)
+            return f"{one.name}: `{name}` diverges at {time:.4g} s of this recording"
+    return f"the errors of `{name}` are beyond the largest number"
 
 
 def _describe_holds(model_set: ModelSet) -> str:

@@ -172,7 +172,7 @@ def _largest_step(series: Sequence[SampledRecording]) -> tuple[int, int, int] | 
     for k, one in enumerate(series):
         period = float(one.period)
         few, first = max(1, round(STEP_TIME / period)), round(OBSERVED_TIME / period)
-        steps = np.max(np.abs(one.inputs[few:] - one.inputs[:-few]) / scale, axis=1)
+        steps = np.max(np.abs(one.inputs[few:] - one.inputs[:-few]) / scale, axis=1, initial=0.0)
         last = one.count - round(0.5 / period)
         if last <= first or not np.max(steps[first:last], initial=0.0) > best:
             continue

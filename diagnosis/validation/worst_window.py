@@ -55,9 +55,16 @@ def rms_by_recording(runs: FreeRuns) -> list[tuple[str, Reals, Reals]]:
     found = []
     for one, before, after in zip(runs.series, runs.before, runs.after, strict=True):
         alone = is_free(one)
-        missed = [np.nanmean((one.measured - run)[alone] ** 2, axis=0) for run in (before, after)]
-        found.append((one.name, np.sqrt(missed[0]), np.sqrt(missed[1])))
+        errors = [(one.measured - run)[alone] for run in (before, after)]
+        found.append((one.name, _root_mean_square(errors[0]), _root_mean_square(errors[1])))
     return found
+
+
+def _root_mean_square(errors: Reals) -> Reals:
+    """Return the root mean square of known errors (n, outputs) of each output, NaN without any."""
+    counts = np.sum(np.isfinite(errors), axis=0)
+    squares = np.sum(np.where(np.isfinite(errors), errors, 0.0) ** 2, axis=0)
+    return np.asarray(np.where(counts > 0, np.sqrt(squares / np.maximum(counts, 1)), np.nan))
 
 
 def find_worst_window(runs: FreeRuns, units: Sequence[str], label: str) -> WorstWindow:

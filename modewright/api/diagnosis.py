@@ -17,6 +17,7 @@ from diagnosis.criterion.threshold import (
 )
 from diagnosis.data.holdout import require_disjoint
 from diagnosis.data.recording_names import recording_names
+from diagnosis.data.sampled_recording import UnusableRecordingError
 from diagnosis.data_quality.finding import format_findings
 from diagnosis.data_quality.recording_check import used_columns
 from diagnosis.model.effect_library import explain_unplaceable, library_effects, load_effects
@@ -52,6 +53,7 @@ from language.text.arguments import (
     to_text,
     to_texts,
 )
+from language.text.diagnostic import Problems
 from modewright.api.recordings import CheckedRecordings, check_recordings, held_out_findings
 from modewright.runtime.blas_threads import SingleThreadedBlas
 from modewright.runtime.gc_threshold import infrequent_gc
@@ -70,7 +72,14 @@ class BudgetSpent(Exception):
 
 
 class UnusableRecordings(Exception):
-    """All recordings have errors, so that no result can be derived."""
+    """No model can be fitted to the recordings, so that no result can be derived.
+
+    `can_be_used_anyway` tells whether the option `anyway` would use them nevertheless.
+    """
+
+    def __init__(self, text: str, can_be_used_anyway: bool = False) -> None:
+        super().__init__(text)
+        self.can_be_used_anyway = can_be_used_anyway
 
 
 class _Budget:
@@ -209,6 +218,9 @@ def _conclude(
         return DiagnosisReport(
             case, automaton, checked.check, verdict, unused_recordings=left_out, end_reason=ended
         )
+    except UnusableRecordingError as error:
+        budget.report(f"not usable: {error}")
+        return _report_unusable(case, automaton, checked, (*reasons, str(error)), budget)
     case = dataclasses.replace(case, thresholds=diagnosis.thresholds)
     after = file_digests(case, case.held_out)
     unfollowed = tuple(unfollowed_signals(diagnosis.verdict))
@@ -287,9 +299,13 @@ def _build_case(
     effects: Path | None,
     project: Project,
 ) -> tuple[Case, Automaton]:
-    """Return the case of a diagnosis and its automaton."""
+    """Return the case of a diagnosis and its automaton.
+
+    Raises SpecError for a sampled automaton, which has no equations that recordings could refute.
+    """
     document = read_document(project.path_of(spec))
     automaton = checked.automaton or automaton_of(document, project)
+    _require_continuous(automaton)
     expanded_document = expand_document(document, project)
     files = tuple(Path(file) for file in train), tuple(Path(file) for file in held_out)
     candidates = _load_effects(effects, project)
@@ -307,6 +323,16 @@ def _build_case(
         recordings=read,
     )
     return case, automaton
+
+
+def _require_continuous(automaton: Automaton) -> None:
+    """Raise SpecError, at the place of the spec, for a sampled automaton."""
+    problems = Problems()
+    if automaton.is_sampled:
+        label = f"`{automaton.name}` is sampled: it has a period"
+        hint = "only a continuous automaton, the model of a machine, is compared with recordings"
+        problems.error("form", automaton.span, label, hint)
+    problems.raise_if_errors()
 
 
 def _read_thresholds(thresholds: str) -> Thresholds:
@@ -342,8 +368,8 @@ def fit(
     `parameters` are the names to fit; None means all with a range. `map` defaults to the map of the
     spec. Recordings with errors are left out, unless `anyway`. `tell` is called with warnings and
     errors of recordings, with those left out, and with progress. Writes no file. Raises
-    UnusableRecordings if no recording remains, SpecError, MissingToolError, and ValueError, also
-    for an empty `train` or `parameters`.
+    UnusableRecordings if no recording remains or the model diverges on one, SpecError,
+    MissingToolError, and ValueError, also for an empty `train` or `parameters`.
     """
     spec, project, files = to_text(spec, "spec"), to_project(root), to_some_texts(train, "train")
     names = optional(to_some_texts, parameters, "parameters")
@@ -357,9 +383,13 @@ def fit(
         if not text.startswith("note"):
             tell(text)
     if not usable_files:
-        raise UnusableRecordings("the recordings are not usable; nothing was fitted to them")
+        text = "the recordings are not usable; nothing was fitted to them"
+        raise UnusableRecordings(text, can_be_used_anyway=not anyway)
     for file in case.train:
         if file not in usable_files:
             tell(f"left out: {case.name_of(file)}")
     case = dataclasses.replace(case, train=usable_files)
-    return fit_case(case, names, tell)
+    try:
+        return fit_case(case, names, tell)
+    except UnusableRecordingError as error:
+        raise UnusableRecordings(f"{error}; nothing was fitted") from None

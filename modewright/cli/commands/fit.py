@@ -56,7 +56,8 @@ def fit(
                 spec, train, chosen, mapping, anyway=anyway, tell=report_progress
             )
     except UnusableRecordings as error:
-        print(f"error: {error} (`--anyway` uses them nevertheless)", file=sys.stderr)
+        hint = " (`--anyway` uses them nevertheless)" if error.can_be_used_anyway else ""
+        print(f"error: {error}{hint}", file=sys.stderr)
         raise typer.Exit(PROBLEMS) from None
     if out:
         write_files({out: result.calibration(title, date).encode()})

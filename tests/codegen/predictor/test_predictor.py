@@ -73,3 +73,43 @@ def test_parameters_stay_though_nothing_that_is_left_reads_them() -> None:
     """The page of a fit has a column for each."""
     made = slider(only="value: 2, tunable: true, range: [0, 9]")
     assert "only_shown" in columns_of(slice_to_outputs(made), ("x",)).page
+
+
+TABLE_TEXT = """language: 1
+automaton: looked_up
+step: 10 ms
+parameters:
+  gain: {value: 1, tunable: true, range: [0, 9]}
+  curve: {table: {over: u, points: {-1: 0, 0: 1, 2: 4}}}
+inputs: {u: {unit: "1", range: [-99, 99]}}
+states: {x: {unit: "1", initial: 1, range: [-99, 99]}}
+flow: {x: "1 s * der(x) = -gain * x + pull"}
+initial: low
+modes:
+  low:
+    equations: {pull: "0 + lookup(curve, u)"}
+    transitions: {high: {when: u > 1}}
+  high:
+    equations: {pull: "0 + u"}
+    transitions: {low: {when: u < -2}}
+outputs: [x]
+"""
+
+
+def test_a_table_that_one_mode_reads_is_no_vector() -> None:
+    """The other mode is followed in vectors."""
+    made = program(TABLE_TEXT)
+    columns = columns_of(made, ("x",))
+    page = np.array(list(columns.page.values()))
+    no_gain = np.zeros((1, 1, 1))
+    with build_predictor(made, columns) as library:
+        run = Predictor(columns, library).predict(
+            page,
+            np.full((9, 1), -0.5),
+            np.zeros((9, 1)),
+            no_gain[:0],
+            no_gain,
+            1,
+            linear_inputs=HELD,
+        )
+    assert run.states[-1, 0] == pytest.approx(0.5 + 0.5 * np.exp(-0.08), rel=1e-6)
