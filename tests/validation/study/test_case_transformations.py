@@ -73,8 +73,8 @@ def si_columns(case: Path) -> dict[str, np.ndarray]:
         column = [row[head.index(name)] for row in rows]
         factor = float(one.unit.factor * one.scale[0])
         found[name] = np.array([float(cell) * factor if cell else math.nan for cell in column])
-    column = [float(row[head.index(mapping.time)]) for row in rows]
-    return {**found, "time": np.array(column) * float(mapping.time_unit.factor)}
+    times = [float(row[head.index(mapping.time)]) for row in rows]
+    return {**found, "time": np.array(times) * float(mapping.time_unit.factor)}
 
 
 @pytest.mark.parametrize("name", [one.name for one in TRANSFORMATIONS if one.name[:4] != "blas"])
