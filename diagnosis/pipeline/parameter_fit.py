@@ -12,9 +12,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from diagnosis.data.sampled_recording import compared_outputs, share_period
-from diagnosis.estimation.covariance import correlations_of, quantities_of
+from diagnosis.estimation.covariance import correlations_of, marginal_covariance
 from diagnosis.estimation.estimate import Estimate, evaluate
+from diagnosis.estimation.full_rate_fit import fit_full_rate
 from diagnosis.estimation.quantity import Quantity
 from diagnosis.model.parameter import FreeParameter
 from diagnosis.model.parameter_text import format_value
@@ -124,13 +127,17 @@ def fit(
     model_set, estimate = fit_base(build_model_set(case, automaton, series, seen), log)
     if not estimate.candidate.free_parameters:
         raise ValueError(f"no parameter of `{automaton.name}` has a `range` to be fitted in")
-    start = vector_of(estimate.candidate, len(model_set.series), {})
-    declared = evaluate(estimate.candidate, model_set.series, estimate.noise_levels, start)
+    full_rate, estimate = fit_full_rate(model_set, estimate, series)
+    start = vector_of(estimate.candidate, len(full_rate), {})
+    declared = evaluate(estimate.candidate, full_rate, estimate.noise_levels, start)
+    covariance, names = marginal_covariance(estimate)
+    correlations = correlations_of(covariance, names)
+    stds = dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
     return Fit(
         automaton,
-        _fitted_parameters(automaton, estimate),
-        correlations_of(estimate),
-        compare_misfits(declared, estimate, model_set.series),
+        _fitted_parameters(automaton, estimate, stds, correlations),
+        correlations,
+        compare_misfits(declared, estimate, full_rate),
         file_digests(case, case.train),
         estimate,
     )
@@ -179,22 +186,27 @@ def _parameter_table(root: MappingNode, name: str) -> MappingNode | None:
     return node if isinstance(node, MappingNode) else None
 
 
-def _fitted_parameters(automaton: Automaton, estimate: Estimate) -> tuple[FittedParameter, ...]:
-    """Return the fitted parameters of an estimate in its order."""
+def _fitted_parameters(
+    automaton: Automaton,
+    estimate: Estimate,
+    stds: Mapping[str, float],
+    correlations: Mapping[tuple[str, str], float],
+) -> tuple[FittedParameter, ...]:
+    """Return the fitted parameters of an estimate in its order, with standard deviations [SI]."""
     strongest: dict[str, tuple[str, float]] = {}
-    for (first, second), together in correlations_of(estimate).items():
+    for (first, second), together in correlations.items():
         strongest.setdefault(first, (second, together))
         strongest.setdefault(second, (first, together))
-    coordinates = {one.name: one for one in estimate.candidate.free_parameters}
-    fitted = []
-    for name, quantity in quantities_of(estimate).items():
-        value = automaton.parameters[name].value
-        assert value is not None
-        one = coordinates[name]
+    values, fitted = estimate.values(0), []
+    for one in estimate.candidate.free_parameters:
+        if one.per_recording:
+            continue
+        declared = automaton.parameters[one.name].value
+        assert declared is not None
+        quantity = Quantity(values[one.name], one.unit, stds[one.name])
         left, note = prior_std_ratio(quantity, one), parameter_note(quantity, one)
-        fitted.append(
-            FittedParameter(name, float(value), quantity, left, note, strongest.get(name))
-        )
+        pair = strongest.get(one.name)
+        fitted.append(FittedParameter(one.name, float(declared), quantity, left, note, pair))
     return tuple(fitted)
 
 
