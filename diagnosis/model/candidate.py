@@ -145,6 +145,7 @@ def compile_candidate(
     output_names: Sequence[str],
     period: Fraction,
     offset_states: Sequence[str] = (),
+    min_substeps: int = 1,
 ) -> Candidate:
     """Return the base with placed effects and disturbances, compiled for a sample period [s].
 
@@ -153,7 +154,7 @@ def compile_candidate(
     add disturbance states. Initial values of states among `output_names` become tunable. The
     initial values of `offset_states` have an offset for each recording, a free parameter
     (`INITIAL_OFFSET_NAME`) whose prior has a standard deviation of `INITIAL_STD_FRACTION` (1 %) of
-    the range of its state. Raises SpecError, and MissingToolError or BuildError if no C compiler
+    the range of its state. A sample has at least `min_substeps` major steps. Raises SpecError, and MissingToolError or BuildError if no C compiler
     works.
     """
     all_layers = [*placed_effects, *disturbances]
@@ -165,10 +166,14 @@ def compile_candidate(
     counts = f"{len(placed_effects)} effects, {len(disturbances)} disturbances"
     offsets = [INITIAL_OFFSET_NAME.format(name) for name in offset_states]
     key = cache_key(node_text(document.root), counts, *parts, *output_names, str(period), *offsets)
+    if min_substeps > 1:
+        key = cache_key(key, str(min_substeps))
 
     def make() -> tuple[CompiledModel, bytes]:
         made = automaton_with_effects(document, project, all_layers)
-        return _compile(made, placed_effects, disturbances, output_names, period, offset_states)
+        return _compile(
+            made, placed_effects, disturbances, output_names, period, offset_states, min_substeps
+        )
 
     recipe, library = load_or_compile(key, make)
     return Candidate(tuple(placed_effects), recipe, Predictor(recipe.columns, library))
@@ -181,6 +186,7 @@ def _compile(
     output_names: Sequence[str],
     period: Fraction,
     offset_states: Sequence[str],
+    min_substeps: int,
 ) -> tuple[CompiledModel, bytes]:
     """Return the metadata and the shared library of an automaton with its effects, built now."""
     effect_parameters = [
@@ -198,6 +204,7 @@ def _compile(
     names = [*(one.name for one in uncertain), *initial_value_names]
     names = list(dict.fromkeys(names))
     min_count = minimum_substeps(automaton, placed_effects, output_names, period)
+    min_count = max(min_count, min_substeps)
     program, substeps = lower_tunable_program(
         with_initial_values, names, effect_parameters, period, min_count
     )

@@ -44,7 +44,10 @@ from tests.validation.evidence.evidence_store import ROOT
 
 MACHINES = Path(__file__).with_name("coverage_machines.yaml")
 RUNS, SAMPLES, LONGEST = 3, 1500, 4000
-"""Recordings of a random machine and samples of each; most samples of a real recording."""
+"""Recordings of a random machine, samples of each unless its template says otherwise, and most
+samples of a real recording."""
+STEPS = 40
+"""Mean number of steps of an input in a recording."""
 MOST_RUNS = 3
 """Most real recordings whose inputs are used."""
 NOISE = (0.003, 0.03)
@@ -131,8 +134,9 @@ def random_machine(number: int, seed: int) -> Machine:
         "parameters": {**lines, **body.get("parameters", {})},
         "inputs": {one: {"unit": how["unit"]} for one, how in made["inputs"].items()},
     }
+    samples = made.get("samples", SAMPLES)
     runs = tuple(
-        np.column_stack([_draw_input(random, how) for how in made["inputs"].values()])
+        np.column_stack([_draw_input(random, how, samples) for how in made["inputs"].values()])
         for _ in range(RUNS)
     )
     is_held = random.random() < 0.5
@@ -143,14 +147,14 @@ def random_machine(number: int, seed: int) -> Machine:
     return Machine(f"{name}_{number}", text, outputs, period, runs, holds, ({},) * RUNS, None)
 
 
-def _draw_input(random: np.random.Generator, how: dict[str, object]) -> Reals:
+def _draw_input(random: np.random.Generator, how: dict[str, object], samples: int) -> Reals:
     """Return an input (samples,): random steps of random length, or random switching."""
-    lengths = random.geometric(1.0 / 40.0, SAMPLES)
-    places = np.repeat(np.arange(SAMPLES), lengths)[:SAMPLES]
+    lengths = random.geometric(STEPS / samples, samples)
+    places = np.repeat(np.arange(samples), lengths)[:samples]
     if "switched" in how:
-        return np.asarray(random.choice(how["switched"], SAMPLES)[places], dtype=np.float64)
+        return np.asarray(random.choice(how["switched"], samples)[places], dtype=np.float64)
     mean, amplitude = float(str(how["mean"])), float(str(how["amplitude"]))
-    return np.asarray(mean + amplitude * random.uniform(-1.0, 1.0, SAMPLES)[places])
+    return np.asarray(mean + amplitude * random.uniform(-1.0, 1.0, samples)[places])
 
 
 def recorded_machine(spec: Path, files: Sequence[Path], seed: int) -> Machine:
@@ -204,7 +208,7 @@ def _drawn_series(
     random = np.random.default_rng([seed, run])
     inputs = np.column_stack(
         [
-            _draw_input(random, {"mean": mean, "amplitude": size})
+            _draw_input(random, {"mean": mean, "amplitude": size}, SAMPLES)
             for mean, size in (DRIVELINE_INPUTS[name] for name in automaton.inputs)
         ]
     )
@@ -361,7 +365,8 @@ def cramer_rao(
     """Return the standard errors [SI] of Cramer and Rao, and the largest deviation in noises.
 
     The deviation is that of the simulation without corrections from the engine. The initial states
-    are known.
+    are known. The information of a uniform distribution over the ranges, 12 over the square of
+    their width, is added, as otherwise a parameter without influence has no bound.
     """
     holds = tuple(hold or "previous" for hold in machine.holds)
     series = [
@@ -389,7 +394,7 @@ def cramer_rao(
         rows.append((change / noise).ravel())
     fisher = np.array(rows) @ np.array(rows).T
     scale = np.array([one.high - one.low for one in free])
-    scaled = fisher * np.outer(scale, scale) + 1e-12 * np.eye(len(scale))
+    scaled = fisher * np.outer(scale, scale) + 12.0 * np.eye(len(scale))
     bound = scale * np.sqrt(np.diag(np.linalg.inv(scaled)))
     worst = float(np.max(np.abs(found[0].values / noise)))
     return {one.name: float(b) for one, b in zip(free, bound, strict=True)}, worst
