@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -38,15 +39,37 @@ Values = Mapping[str, float]
 """Values [SI] of parameters by name."""
 
 
+@dataclass(frozen=True)
+class FullRateFit:
+    """A fit, and the recordings as it predicts them."""
+
+    series: tuple[SampledRecording, ...]
+    estimate: Estimate
+
+    @property
+    def penalised_cost(self) -> float:
+        """The cost [nats] with the penalty of the factor of the gains of an observer."""
+        penalty = 0.5 * np.log(max(float(np.sum(self.estimate.prediction.counts)), 1.0))
+        is_simulated = self.estimate.noise_levels.is_output_error
+        return self.estimate.cost + (0.0 if is_simulated else penalty)
+
+    @property
+    def declared(self) -> Estimate:
+        """The model with its declared values, for the same recordings."""
+        one = self.estimate
+        start = vector_of(one.candidate, len(self.series), {})
+        return evaluate(one.candidate, self.series, one.noise_levels, start)
+
+
 def fit_full_rate(
     model_set: ModelSet, base: Estimate, series: Sequence[SampledRecording]
-) -> tuple[tuple[SampledRecording, ...], Estimate]:
-    """Return the recordings as they are predicted, and the better fit of two noise models.
+) -> list[FullRateFit]:
+    """Return the fits by two noise models, the one of less cost first.
 
     With the first one the only noise is that of the outputs (an output-error model, Ljung 1999,
     section 4.2), and the initial states of each recording are free. The second one is that of
     `base`, an observer for ordinary disturbances. The observer has one parameter more, the factor
-    of its gains, and is chosen if it gains more than the penalty of a parameter (Schwarz 1978).
+    of its gains, and is the first if it gains more than the penalty of a parameter (Schwarz 1978).
     The fits begin at the declared values, at `base`, and where `_follow_gains` ends. Inputs
     without a known hold have the one of less cost.
     """
@@ -56,15 +79,8 @@ def fit_full_rate(
         held = tuple(dataclasses.replace(one, is_first_order_hold=is_linear) for one in series)
         observed = _fit_with_observer(model_set, base, held, starts)
         simulated = _fit_output_error(model_set, held, [*starts, observed.values(0)])
-        fits += [(held, observed), (held, simulated)]
-    held, best = min(fits, key=lambda one: _penalised_cost(one[1]))
-    return _score_first_samples(best, held) if best.noise_levels.is_output_error else (held, best)
-
-
-def _penalised_cost(fit: Estimate) -> float:
-    """Return the cost [nats] of a fit with the penalty of the factor of its gains."""
-    penalty = 0.5 * np.log(max(float(np.sum(fit.prediction.counts)), 1.0))
-    return fit.cost + (0.0 if fit.noise_levels.is_output_error else penalty)
+        fits += [FullRateFit(held, observed), FullRateFit(held, simulated)]
+    return sorted(fits, key=lambda one: one.penalised_cost)
 
 
 def _follow_gains(base: Estimate, series: Sequence[SampledRecording]) -> Values:
@@ -137,21 +153,22 @@ def _fit_with_observer(
     return refine(scaled, series) if changed else fit
 
 
-def _score_first_samples(
-    fit: Estimate, series: tuple[SampledRecording, ...]
-) -> tuple[tuple[SampledRecording, ...], Estimate]:
-    """Return the recordings and the fit with all samples scored, if both fits agree.
+def score_first_samples(one: FullRateFit) -> FullRateFit:
+    """Return a fit of simulations with all samples scored, if it agrees with the given one.
 
-    The initial states are free, so a simulation needs no burn-in. They agree if the samples after
-    the burn-in cost at most one nat more for each parameter. Otherwise the machine does not start
-    as the model does, and the arguments are returned.
+    The initial states are free, so a simulation needs no burn-in. The fits agree if the samples
+    after the burn-in cost at most one nat more for each parameter. Otherwise the machine does not
+    start as the model does. The argument is returned then, and for a fit by an observer.
     """
-    complete = tuple(dataclasses.replace(one, burn_in=0.0) for one in series)
+    fit, series = one.estimate, one.series
+    if not fit.noise_levels.is_output_error:
+        return one
+    complete = tuple(dataclasses.replace(recording, burn_in=0.0) for recording in series)
     further = estimate_parameters(fit.candidate, complete, fit.noise_levels, fit.point)
     lost = evaluate_with_gains_of(fit, series, further.point).cost - fit.cost
     own = int(np.sum(fit.candidate.is_per_recording))
     allowed = len(fit.candidate.names) + (len(series) - 1) * own
-    return (complete, further) if lost <= allowed else (series, fit)
+    return FullRateFit(complete, further) if lost <= allowed else one
 
 
 def _compile(

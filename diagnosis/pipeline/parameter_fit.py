@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -16,12 +17,15 @@ import numpy as np
 
 from diagnosis.data.sampled_recording import compared_outputs, share_period
 from diagnosis.estimation.covariance import correlations_of, marginal_covariance
-from diagnosis.estimation.estimate import Estimate, evaluate
-from diagnosis.estimation.full_rate_fit import fit_full_rate
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.full_rate_fit import (
+    FullRateFit,
+    fit_full_rate,
+    score_first_samples,
+)
 from diagnosis.estimation.quantity import Quantity
 from diagnosis.model.parameter import FreeParameter
 from diagnosis.model.parameter_text import format_value
-from diagnosis.model.parameter_vector import vector_of
 from diagnosis.pipeline.diagnosis_case import Case, build_model_set, file_digests, read_series
 from diagnosis.selection.intersample import LogCallback, fit_base
 from diagnosis.validation.free_simulation import compare_misfits
@@ -107,7 +111,8 @@ def fit(
 ) -> Fit:
     """Return the parameters of a case fitted to its recordings: those with a range, or the named.
 
-    No effects are placed, and the better one of the two holds of inputs is used. The misfits
+    No effects are placed, and the better one of the two holds of inputs is used. The first fit of
+    `fit_full_rate` whose simulations are not worse than those as declared is taken. The misfits
     compare the declared with the fitted parameters. Raises SpecError (also for a name that is
     unknown or has no range), ValueError (no compared output, no free parameter) and
     MissingToolError.
@@ -127,9 +132,9 @@ def fit(
     model_set, estimate = fit_base(build_model_set(case, automaton, series, seen), log)
     if not estimate.candidate.free_parameters:
         raise ValueError(f"no parameter of `{automaton.name}` has a `range` to be fitted in")
-    full_rate, estimate = fit_full_rate(model_set, estimate, series)
-    start = vector_of(estimate.candidate, len(full_rate), {})
-    declared = evaluate(estimate.candidate, full_rate, estimate.noise_levels, start)
+    fits = fit_full_rate(model_set, estimate, series)
+    best = score_first_samples(next((one for one in fits if not _is_worse(one)), fits[0]))
+    estimate = best.estimate
     covariance, names = marginal_covariance(estimate)
     correlations = correlations_of(covariance, names)
     stds = dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
@@ -137,10 +142,24 @@ def fit(
         automaton,
         _fitted_parameters(automaton, estimate, stds, correlations),
         correlations,
-        compare_misfits(declared, estimate, full_rate),
+        compare_misfits(best.declared, estimate, best.series),
         file_digests(case, case.train),
         estimate,
     )
+
+
+def _is_worse(one: FullRateFit) -> bool:
+    """Return whether the simulations by a fit have larger errors than those as declared.
+
+    The errors of the outputs are compared by their product, as in the likelihood.
+    """
+    misfits = compare_misfits(one.declared, one.estimate, one.series).values()
+    return sum(_log(m.nrmse_after) - _log(m.nrmse_before) for m in misfits) > 0.0
+
+
+def _log(value: float) -> float:
+    """Return the natural logarithm, of the smallest normal number for 0."""
+    return math.log(max(value, sys.float_info.min))
 
 
 def restrict_free_parameters(
