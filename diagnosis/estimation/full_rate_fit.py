@@ -29,10 +29,12 @@ from diagnosis.model.parameter_vector import vector_of
 
 OUTPUT_NOISE_FACTORS = (1e-4, 1e-3, 1e-2, 1e-1)
 """Factors of the output noise of the observers by which the starts of fits are found."""
-LINEAR_SUBSTEPS = 4
-"""Factor of the number of steps in a sample for inputs that are linear between samples.
+HELD_SUBSTEPS, LINEAR_SUBSTEPS = 2, 4
+"""Factors of the number of steps in a sample, for held inputs and for linear ones.
 
-The predictor holds an input at the middle of a step, and its error is quadratic in the step.
+The usual steps have a relative error of up to 3e-4 (`STEP_RATE_PRODUCT`), more than the uncertainty
+of a parameter that thousands of samples determine. The predictor holds a linear input at the middle
+of a step, so the error is quadratic in the step.
 """
 
 Values = Mapping[str, float]
@@ -179,15 +181,17 @@ def _compile(
 ) -> Candidate:
     """Return the base with weak priors, compiled for recordings.
 
-    If an input is linear between samples, it has `LINEAR_SUBSTEPS` (4) times the usual steps.
+    It has `HELD_SUBSTEPS` (2) times the usual steps, or `LINEAR_SUBSTEPS` (4) times if an input is
+    linear between samples.
     """
     disturbances = model_set.disturbances if has_disturbances else ()
     parts = (model_set.document, model_set.project, (), disturbances, model_set.output_names)
-    candidate = compile_candidate(*parts, series[0].period, offset_states)
-    if any(np.any(one.linear_inputs) for one in series):
-        substeps = LINEAR_SUBSTEPS * candidate.compiled.substeps
-        candidate = compile_candidate(*parts, series[0].period, offset_states, substeps)
-    return _with_range_priors(candidate)
+    usual = compile_candidate(*parts, series[0].period, offset_states)
+    is_linear = any(np.any(one.linear_inputs) for one in series)
+    substeps = (LINEAR_SUBSTEPS if is_linear else HELD_SUBSTEPS) * usual.compiled.substeps
+    return _with_range_priors(
+        compile_candidate(*parts, series[0].period, offset_states, substeps)
+    )
 
 
 def _with_range_priors(candidate: Candidate) -> Candidate:
