@@ -33,9 +33,7 @@ def quantities_of(model: Estimate) -> dict[str, Quantity]:
     return quantities
 
 
-def correlations_of(
-    covariance: Reals, names: Sequence[str]
-) -> Mapping[tuple[str, str], float]:
+def correlations_of(covariance: Reals, names: Sequence[str]) -> Mapping[tuple[str, str], float]:
     """Return the correlations of all pairs of parameters, largest magnitude first.
 
     `covariance` has the shape (n, n). The key is (name, name) in the order of `names`.
@@ -83,7 +81,9 @@ def marginal_covariance(model: Estimate) -> tuple[Reals, list[str]]:
         (scores[rows][:, free] - scores[rows][:, own] @ projection) @ covariance
         for rows, projection in zip(prediction.slices, projections, strict=True)
     ]
-    found = np.array([long_run_variance([one[:, k] for one in influences]) for k in range(len(free))])
+    found = np.array(
+        [long_run_variance([one[:, k] for one in influences]) for k in range(len(free))]
+    )
     ratios = np.maximum(found / np.diag(covariance), 1.0)
     values, parameters = model.values(0), model.candidate.free_parameters
     slopes = [
@@ -98,8 +98,8 @@ def long_run_variance(series: Sequence[Reals]) -> float:
     """Return the variance of the sum of all values of zero-mean series, (samples,) each.
 
     It is the sum of squares times the integrated autocorrelation 1 + 2 sum of rho(k). The sum ends
-    at the first lag that is at least `WINDOW` (5) times the integrated autocorrelation up to it
-    (Sokal 1997, section 3), or at half of the longest series. Different series are independent.
+    at the first lag that is at least `WINDOW` (5) times the integrated autocorrelation up to it, at
+    least 1 (Sokal 1997, section 3), or at half of the longest series. Different series are independent.
     """
     power = sum(float(one @ one) for one in series)
     if power <= 0.0:
@@ -110,7 +110,7 @@ def long_run_variance(series: Sequence[Reals]) -> float:
     correlations = np.fft.irfft(spectrum, size) / power
     for lag in range(1, longest // 2):
         total += 2.0 * float(correlations[lag])
-        if lag >= WINDOW * total:
+        if lag >= WINDOW * max(total, 1.0):
             break
     return power * total
 

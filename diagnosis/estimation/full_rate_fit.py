@@ -94,7 +94,8 @@ def _follow_gains(base: Estimate, series: Sequence[SampledRecording]) -> Values:
     values of the fit before it; the first one begins at the declared values.
     """
     limits = np.full_like(base.noise_levels.huber_limits, np.inf)
-    candidate, values = _with_range_priors(base.candidate), {}
+    candidate = _with_range_priors(base.candidate)
+    values: Values = {}
     for factor in OUTPUT_NOISE_FACTORS:
         outputs = factor * base.noise_levels.outputs
         levels = dataclasses.replace(
@@ -189,9 +190,7 @@ def _compile(
     usual = compile_candidate(*parts, series[0].period, offset_states)
     is_linear = any(np.any(one.linear_inputs) for one in series)
     substeps = (LINEAR_SUBSTEPS if is_linear else HELD_SUBSTEPS) * usual.compiled.substeps
-    return _with_range_priors(
-        compile_candidate(*parts, series[0].period, offset_states, substeps)
-    )
+    return _with_range_priors(compile_candidate(*parts, series[0].period, offset_states, substeps))
 
 
 def _with_range_priors(candidate: Candidate) -> Candidate:

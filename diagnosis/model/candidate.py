@@ -154,8 +154,8 @@ def compile_candidate(
     add disturbance states. Initial values of states among `output_names` become tunable. The
     initial values of `offset_states` have an offset for each recording, a free parameter
     (`INITIAL_OFFSET_NAME`) whose prior has a standard deviation of `INITIAL_STD_FRACTION` (1 %) of
-    the range of its state. A sample has at least `min_substeps` major steps. Raises SpecError, and MissingToolError or BuildError if no C compiler
-    works.
+    the range of its state. A sample has at least `min_substeps` major steps. Raises SpecError, and
+    MissingToolError or BuildError if no C compiler works.
     """
     all_layers = [*placed_effects, *disturbances]
     parts = [

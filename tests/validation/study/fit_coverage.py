@@ -15,10 +15,11 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
@@ -52,6 +53,8 @@ MOST_RUNS = 3
 """Most real recordings whose inputs are used."""
 NOISE = (0.003, 0.03)
 """Noise of the outputs of a random machine, in standard deviations of their signals."""
+RANGE = (0.5, 2.0)
+"""Range of a parameter of a random machine, in declared values."""
 STEP = 1e-4
 """Relative step of the differences of the Cramer-Rao bound."""
 IDENTIFIABLE = 0.1
@@ -122,9 +125,8 @@ def random_machine(number: int, seed: int) -> Machine:
     lines = {}
     for one, (value, unit) in made["parameters"].items():
         value = float(f"{value * 2.0 ** random.uniform(-1.0, 1.0):.3g}")
-        lines[one] = {
-            "value": f"{value:.6g} {unit}", "range": [float(f"{value * part:.3g}") for part in (0.5, 2.0)]
-        }  # fmt: skip
+        limits = [float(f"{value * part:.3g}") for part in RANGE]
+        lines[one] = {"value": f"{value:.6g} {unit}", "range": limits}
     spec = {
         "language": 1,
         "automaton": name,
@@ -147,13 +149,13 @@ def random_machine(number: int, seed: int) -> Machine:
     return Machine(f"{name}_{number}", text, outputs, period, runs, holds, ({},) * RUNS, None)
 
 
-def _draw_input(random: np.random.Generator, how: dict[str, object], samples: int) -> Reals:
+def _draw_input(random: np.random.Generator, how: Mapping[str, Any], samples: int) -> Reals:
     """Return an input (samples,): random steps of random length, or random switching."""
     lengths = random.geometric(STEPS / samples, samples)
     places = np.repeat(np.arange(samples), lengths)[:samples]
     if "switched" in how:
         return np.asarray(random.choice(how["switched"], samples)[places], dtype=np.float64)
-    mean, amplitude = float(str(how["mean"])), float(str(how["amplitude"]))
+    mean, amplitude = float(how["mean"]), float(how["amplitude"])
     return np.asarray(mean + amplitude * random.uniform(-1.0, 1.0, samples)[places])
 
 
@@ -213,7 +215,9 @@ def _drawn_series(
         ]
     )
     blank = np.full((SAMPLES, len(outputs)), np.nan)
-    return SampledRecording("drawn", Fraction(1, 100), Fraction(0), inputs, blank, holds=(None,) * 2)
+    return SampledRecording(
+        "drawn", Fraction(1, 100), Fraction(0), inputs, blank, holds=(None,) * 2
+    )
 
 
 def draw_truth(free: Sequence[FreeParameter], random: np.random.Generator) -> dict[str, float]:
@@ -264,7 +268,8 @@ def simulate_machine(machine: Machine, folder: Path, seed: int) -> Experiment:
     spread = np.std(np.concatenate(clean), axis=0)
     noise = machine.noise
     if noise is None:
-        noise = spread * np.exp(random.uniform(*np.log(NOISE), len(spread)))
+        low, high = np.log(NOISE)
+        noise = spread * np.exp(random.uniform(low, high, len(spread)))
     noise = np.maximum(noise, 1e-6 * spread)
     files = []
     for k, (inputs, outputs) in enumerate(zip(machine.inputs, clean, strict=True)):
@@ -276,9 +281,7 @@ def simulate_machine(machine: Machine, folder: Path, seed: int) -> Experiment:
     return Experiment(folder, name, tuple(files), truth, bound, worst)
 
 
-def _write_map(
-    machine: Machine, automaton: Automaton, folder: Path, units: dict[str, str]
-) -> None:
+def _write_map(machine: Machine, automaton: Automaton, folder: Path, units: dict[str, str]) -> None:
     """Write the map of the recordings, with all columns in SI units."""
     assert automaton.recording_map is not None
     columns: dict[str, dict[str, str]] = {}
@@ -384,9 +387,8 @@ def cramer_rao(
     for one in free:
         size = STEP * (abs(truth[one.name]) if one.is_log else one.high - one.low)
         points += [{**truth, one.name: truth[one.name] + sign * size} for sign in (1.0, -1.0)]
-    found = predict_at_points(
-        candidate, series, [[point] * len(series) for point in points], gains, np.full(outputs, np.inf)
-    )  # fmt: skip
+    values, limits = [[point] * len(series) for point in points], np.full(outputs, np.inf)
+    found = predict_at_points(candidate, series, values, gains, limits)
     rows = []
     for k, one in enumerate(free):
         size = STEP * (abs(truth[one.name]) if one.is_log else one.high - one.low)
@@ -435,8 +437,7 @@ def machines(cases: int, seed: int, recordings: Path | None) -> Iterator[Machine
             yield recorded_machine(ROOT / "spec" / "recorded" / f"{name}.yaml", paths, seed)
     for spec in sorted(recordings.glob("*/*.yaml")) if recordings is not None else ():
         if "automaton:" in spec.read_text("utf-8"):
-            files = sorted(spec.parent.glob("*.csv.gz"))[:MOST_RUNS]
-            yield recorded_machine(spec, files, seed)
+            yield recorded_machine(spec, sorted(spec.parent.glob("*.csv.gz"))[:MOST_RUNS], seed)
 
 
 def run_study(
@@ -467,12 +468,32 @@ def run_study(
     return results
 
 
+def diagnose_machines(cases: int, seed: int) -> list[str]:
+    """Print and return the outcome of the diagnosis of each random machine, as it is complete."""
+    outcomes: list[str] = []
+    for number in range(cases):
+        machine = random_machine(number, seed)
+        with tempfile.TemporaryDirectory() as folder:
+            experiment = simulate_machine(machine, Path(folder) / "case", seed + number)
+            files = [experiment.folder / one for one in experiment.files]
+            begun = time.monotonic()
+            report = mw.diagnose(experiment.spec, files, root=experiment.folder, anyway=True)
+        verdict = report.verdict
+        named = ", ".join(one.id for one in verdict.effects)
+        print(
+            f"{machine.name:20} {verdict.verdict} {named} {time.monotonic() - begun:.1f} s",
+            flush=True,
+        )
+        outcomes.append(verdict.verdict)
+    return outcomes
+
+
 def format_row(one: ParameterResult) -> str:
     """Return a line of the table."""
-    flags = f"{'' if one.is_determined else 'undetermined '}{one.note}"
     return (
-        f"{one.machine:20} {one.parameter:8} {one.truth:11.5g} {one.estimate:11.5g} {one.std:10.3g} "
-        f"{one.z:8.2f} {one.bound:10.3g} {one.std / one.bound:7.2f}  {flags}"
+        f"{one.machine:20} {one.parameter:8} {one.truth:11.5g} {one.estimate:11.5g} {one.std:10.3g}"
+        f" {one.z:8.2f} {one.bound:10.3g} {one.std / one.bound:7.2f}"
+        f"  {'' if one.is_determined else 'undetermined '}{one.note}"
     )
 
 
@@ -498,7 +519,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--recordings", type=Path, help="folder of the real recordings")
     parser.add_argument("--out", type=Path, default=Path("build/fit_coverage.jsonl"))
     parser.add_argument("--only", nargs="*", default=(), help="names of machines")
+    parser.add_argument("--diagnose", action="store_true", help="diagnose the random machines")
     asked = parser.parse_args(arguments)
+    if asked.diagnose:
+        outcomes = diagnose_machines(asked.cases, asked.seed)
+        print(f"nothing is missing: {outcomes.count('nothing_missing')} of {len(outcomes)}")
+        return 0
     asked.out.parent.mkdir(parents=True, exist_ok=True)
     print("machine, parameter, truth, estimate, std, z, Cramer-Rao, std / Cramer-Rao")
     results = run_study(asked.cases, asked.seed, asked.recordings, asked.out, asked.only)
