@@ -99,7 +99,8 @@ def long_run_variance(series: Sequence[Reals]) -> float:
 
     It is the sum of squares times the integrated autocorrelation 1 + 2 sum of rho(k). The sum ends
     at the first lag that is at least `WINDOW` (5) times the integrated autocorrelation up to it, at
-    least 1 (Sokal 1997, section 3), or at half of the longest series. Different series are independent.
+    least 1 (Sokal 1997, section 3), or at half of the longest series. Different series are
+    independent.
     """
     power = sum(float(one @ one) for one in series)
     if power <= 0.0:

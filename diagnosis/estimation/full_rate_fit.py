@@ -119,7 +119,8 @@ def _fit_output_error(
         INITIAL_OFFSET_NAME.format(name): float(std)
         for name, std in zip(model_set.output_names, measured.outputs, strict=True)
     }
-    candidate = _compile(model_set, series, tuple(model_set.automaton.states), False)
+    states = tuple(one.name for one in model_set.automaton.states.values() if one.type == "real")
+    candidate = _compile(model_set, series, states, False)
     offsets = [
         dataclasses.replace(one, prior_std=noise.get(one.name, one.prior_std))
         if one.per_recording

@@ -55,7 +55,7 @@ NOISE = (0.003, 0.03)
 """Noise of the outputs of a random machine, in standard deviations of their signals."""
 RANGE = (0.5, 2.0)
 """Range of a parameter of a random machine, in declared values."""
-STEP = 1e-4
+STEP = 1e-6
 """Relative step of the differences of the Cramer-Rao bound."""
 IDENTIFIABLE = 0.1
 """A parameter is identifiable if its Cramer-Rao bound is below this fraction of its range."""
