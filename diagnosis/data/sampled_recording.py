@@ -40,7 +40,8 @@ MIN_PERIODS = 5.0
 MIN_TIMES = 10.0
 DECIMATED_COUNT = 1500
 """Samples that a recording of median length keeps when it is decimated."""
-
+BURN_IN = 2.5
+"""Reference times at the start of a recording that are not scored, for the observer to settle."""
 
 Hold = Literal["previous", "linear"] | None
 """Behaviour of an input between samples; None if it is not known."""
@@ -65,6 +66,7 @@ class SampledRecording:
     measured: Reals
     is_first_order_hold: bool = False
     holds: tuple[Hold, ...] = ()
+    burn_in: float = BURN_IN
 
     @property
     def count(self) -> int:

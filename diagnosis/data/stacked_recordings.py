@@ -12,8 +12,6 @@ from codegen.predictor.predictor_arrays import StackedRecordings
 from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import SampledRecording
 
-BURN_IN = 2.5
-"""Reference times at the start of a recording that are not scored, for the observer to settle."""
 CACHE_SIZE = 24
 """Number of stacked sets that are cached; the least recently used one is dropped."""
 
@@ -31,8 +29,8 @@ _cache: OrderedDict[tuple[int, ...], StackedExperiments] = OrderedDict()
 
 
 def burn_in_samples(series: SampledRecording) -> int:
-    """Return the samples of the burn-in, which may exceed those of a short recording."""
-    return series.sample_count(BURN_IN)
+    """Return the samples of the burn-in, at least 1, which may exceed those of a short recording."""
+    return series.sample_count(series.burn_in)
 
 
 def stack_recordings(series: Sequence[SampledRecording]) -> StackedExperiments:

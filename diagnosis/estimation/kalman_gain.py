@@ -14,10 +14,8 @@ from diagnosis.data.stacked_recordings import burn_in_samples
 from diagnosis.estimation.innovations import KalmanGains, NoiseLevels, PredictionResult
 from diagnosis.estimation.linearisation import LinearModel
 from diagnosis.estimation.operating_point import linearise_modes
-from diagnosis.model.candidate import Candidate
+from diagnosis.model.candidate import INITIAL_STD_FRACTION, Candidate
 
-INITIAL_STD_FRACTION = 0.01
-"""Initial standard deviation of a state, as a fraction of its range."""
 MIN_INTEGRATOR_EIGENVALUE = 0.999
 """Diagonal element of the transition matrix above which a state counts as an integrator."""
 MODEL_NOISE_FRACTION = 1e-7

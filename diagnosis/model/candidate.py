@@ -24,15 +24,20 @@ from diagnosis.model.placed_effect import (
     lower_tunable_program,
     minimum_substeps,
 )
-from language.expressions.syntax_tree import Name, names
+from language.expressions.syntax_tree import Arithmetic, Name, names
 from language.lowering.delay_buffers import memory_calls_by_key
 from language.model.automaton import Automaton
-from language.model.declaration import Formula, Parameter
+from language.model.declaration import Formula, Parameter, State
 from language.overlays.expand_document import Project
+from language.overlays.name_types import format_si_unit
 from language.text.document import Document
 
 INITIAL_VALUE_NAME = "start_of_{}"
 """Name of the tunable parameter that replaces the initial value of a compared state."""
+INITIAL_OFFSET_NAME = "start_offset_of_{}"
+"""Name of the tunable parameter that is added to the initial value of a state."""
+INITIAL_STD_FRACTION = 0.01
+"""Initial standard deviation of a state, as a fraction of its range."""
 
 
 @dataclass(frozen=True)
@@ -123,10 +128,15 @@ def compile_candidate(
     disturbances: Sequence[PlacedEffect],
     output_names: Sequence[str],
     period: Fraction,
+    offset_states: Sequence[str] = (),
+    min_substeps: int = 1,
 ) -> Candidate:
     """Return the base with effects and disturbances, compiled for a sample period [s].
 
-    Initial values of states among `output_names` become tunable. Raises SpecError, and
+    Initial values of states among `output_names` become tunable. The initial values of
+    `offset_states` have an offset for each recording, a free parameter (`INITIAL_OFFSET_NAME`)
+    whose prior has a standard deviation of `INITIAL_STD_FRACTION` (1 %) of the range of its state.
+    A sample has at least `min_substeps` major steps. Raises SpecError, and
     MissingToolError or BuildError if no C compiler works.
     """
     all_layers = [*placed_effects, *disturbances]
@@ -134,11 +144,16 @@ def compile_candidate(
         f"{one.id} {one.suffix} {one.scales} {node_text(one.effect.body)}" for one in all_layers
     ]
     counts = f"{len(placed_effects)} effects, {len(disturbances)} disturbances"
-    key = cache_key(node_text(document.root), counts, *parts, *output_names, str(period))
+    offsets = [INITIAL_OFFSET_NAME.format(name) for name in offset_states]
+    key = cache_key(node_text(document.root), counts, *parts, *output_names, str(period), *offsets)
+    if min_substeps > 1:
+        key = cache_key(key, str(min_substeps))
 
     def make() -> tuple[CompiledModel, bytes]:
         made = automaton_with_effects(document, project, all_layers)
-        return _compile(made, placed_effects, disturbances, output_names, period)
+        return _compile(
+            made, placed_effects, disturbances, output_names, period, offset_states, min_substeps
+        )
 
     recipe, library = load_or_compile(key, make)
     return Candidate(tuple(placed_effects), recipe, Predictor(recipe.columns, library))
@@ -150,14 +165,19 @@ def _compile(
     disturbances: Sequence[PlacedEffect],
     output_names: Sequence[str],
     period: Fraction,
+    offset_states: Sequence[str],
+    min_substeps: int,
 ) -> tuple[CompiledModel, bytes]:
     """Return the metadata and the shared library of an automaton with its effects, built now."""
     effect_parameters = [name for one in placed_effects for name in effect_names(one)]
     uncertain = free_parameters_of(automaton, effect_parameters)
+    uncertain += tuple(_offset_parameter(automaton.states[name]) for name in offset_states)
     with_initial_values = _with_tunable_initial_values(automaton, output_names)
+    with_initial_values = _with_initial_offsets(with_initial_values, offset_states)
     added = [name for name in with_initial_values.parameters if name not in automaton.parameters]
-    names = [*(one.name for one in uncertain), *added]
+    names = list(dict.fromkeys([*(one.name for one in uncertain), *added]))
     min_count = minimum_substeps(automaton, placed_effects, output_names, period)
+    min_count = max(min_count, min_substeps)
     program, substeps = lower_tunable_program(
         with_initial_values, names, effect_parameters, period, min_count
     )
@@ -178,6 +198,28 @@ def _compile(
     )
     with build_predictor(program, columns) as library:
         return recipe, library.read_bytes()
+
+
+def _offset_parameter(state: State) -> FreeParameter:
+    """Return the free parameter of the initial offset of a state, with a value per recording."""
+    width = float(state.range[1] - state.range[0]) if state.range else 1.0
+    name, unit = INITIAL_OFFSET_NAME.format(state.name), format_si_unit(state.unit.dimension)
+    std = INITIAL_STD_FRACTION * width
+    return FreeParameter(name, 0.0, -width, width, std, False, per_recording=True, unit=unit)
+
+
+def _with_initial_offsets(automaton: Automaton, offset_states: Sequence[str]) -> Automaton:
+    """Return an automaton in which a new parameter is added to the initial value of some states."""
+    parameters, states = dict(automaton.parameters), dict(automaton.states)
+    for name in offset_states:
+        state = states[name]
+        offset, span = INITIAL_OFFSET_NAME.format(name), state.span
+        parameters[offset] = Parameter(
+            offset, "fixed", state.unit, Fraction(0), None, None, f"parameters.{offset}", span
+        )
+        total = Arithmetic("+", state.initial.tree, Name(offset, span), span)
+        states[name] = dataclasses.replace(state, initial=Formula(total, state.initial.key))
+    return dataclasses.replace(automaton, parameters=parameters, states=states)
 
 
 def _delay_parameters(automaton: Automaton) -> tuple[str, ...]:

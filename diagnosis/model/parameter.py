@@ -6,6 +6,7 @@ of its prior away: a fraction of a positive value (in its logarithm), else a fra
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -130,6 +131,17 @@ def si_unit(parameter: Parameter) -> str:
     unit = parameter.unit
     is_si = unit.factor == 1 and unit.offset == 0
     return unit.text if is_si else format_si_unit(unit.dimension)
+
+
+def with_range_prior(one: FreeParameter) -> FreeParameter:
+    """Return a free parameter whose prior has the standard deviation of its range.
+
+    This is the one of a uniform distribution over the range, or over its logarithm. A parameter
+    with a range of no width is returned unchanged.
+    """
+    low, high = one.bounds
+    width = (high - low) * one.prior_std
+    return dataclasses.replace(one, prior_std=width / math.sqrt(12.0)) if width > 0.0 else one
 
 
 def declared_value(automaton: Automaton, text: str) -> float | None:

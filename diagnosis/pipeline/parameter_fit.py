@@ -9,15 +9,22 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from diagnosis.data.sampled_recording import compared_outputs, share_period
-from diagnosis.estimation.covariance import correlations_of, quantities_of
-from diagnosis.estimation.estimate import Estimate, evaluate
+from diagnosis.estimation.covariance import correlations_of, marginal_covariance
+from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.full_rate_fit import (
+    FullRateFit,
+    fit_full_rate,
+    score_first_samples,
+)
 from diagnosis.estimation.quantity import Quantity
 from diagnosis.model.parameter import FreeParameter, format_value
-from diagnosis.model.parameter_vector import vector_of
 from diagnosis.pipeline.diagnosis_case import Case, build_model_set, file_digests, read_series
 from diagnosis.selection.intersample import LogCallback, fit_base
 from diagnosis.validation.free_simulation import Misfit, compare_misfits
@@ -102,7 +109,8 @@ def fit(
 ) -> Fit:
     """Return the parameters of a case fitted to its recordings: those with a range, or the named.
 
-    No effects are placed, and the better one of the two holds of inputs is used. The misfits
+    No effects are placed, and the better one of the two holds of inputs is used. The first fit of
+    `fit_full_rate` whose simulations are not worse than those as declared is taken. The misfits
     compare the declared with the fitted parameters. Raises SpecError (also for a name that is
     unknown or has no range, and without a parameter that has a range), ValueError (no compared
     output, unusable recordings) and MissingToolError.
@@ -121,13 +129,17 @@ def fit(
         [one for path in case.train for one in read_series(path, case, automaton, seen)]
     )
     model_set, estimate = fit_base(build_model_set(case, automaton, series, seen), log)
-    start = vector_of(estimate.candidate, len(model_set.series), {})
-    declared = evaluate(estimate.candidate, model_set.series, estimate.noise_levels, start)
+    fits = fit_full_rate(model_set, estimate, series)
+    best = score_first_samples(next((one for one in fits if not _is_worse(one)), fits[0]))
+    estimate = best.estimate
+    covariance, names = marginal_covariance(estimate)
+    correlations = correlations_of(covariance, names)
+    stds = dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
     return Fit(
         automaton,
-        _fitted_parameters(automaton, estimate),
-        correlations_of(estimate),
-        compare_misfits(declared, estimate, model_set.series),
+        _fitted_parameters(automaton, estimate, stds, correlations),
+        correlations,
+        compare_misfits(best.declared, estimate, best.series),
         file_digests(case, case.train),
         estimate,
     )
@@ -140,6 +152,20 @@ def _require_free_parameter(automaton: Automaton) -> None:
         label = f"no parameter of `{automaton.name}` has a range to be fitted in"
         problems.error("range", automaton.span, label, "`range: [low, high]` beside its value")
     problems.raise_if_errors()
+
+
+def _is_worse(one: FullRateFit) -> bool:
+    """Return whether the simulations by a fit have larger errors than those as declared.
+
+    The errors of the outputs are compared by their product, as in the likelihood.
+    """
+    misfits = compare_misfits(one.declared, one.estimate, one.series).values()
+    return sum(_log(m.nrmse_after) - _log(m.nrmse_before) for m in misfits) > 0.0
+
+
+def _log(value: float) -> float:
+    """Return the natural logarithm, of the smallest normal number for 0."""
+    return math.log(max(value, sys.float_info.min))
 
 
 def restrict_free_parameters(
@@ -185,22 +211,27 @@ def _parameter_table(root: MappingNode, name: str) -> MappingNode | None:
     return node if isinstance(node, MappingNode) else None
 
 
-def _fitted_parameters(automaton: Automaton, estimate: Estimate) -> tuple[FittedParameter, ...]:
-    """Return the fitted parameters of an estimate in its order."""
+def _fitted_parameters(
+    automaton: Automaton,
+    estimate: Estimate,
+    stds: Mapping[str, float],
+    correlations: Mapping[tuple[str, str], float],
+) -> tuple[FittedParameter, ...]:
+    """Return the fitted parameters of an estimate in its order, with standard deviations [SI]."""
     strongest: dict[str, tuple[str, float]] = {}
-    for (first, second), together in correlations_of(estimate).items():
+    for (first, second), together in correlations.items():
         strongest.setdefault(first, (second, together))
         strongest.setdefault(second, (first, together))
-    coordinates = {one.name: one for one in estimate.candidate.free_parameters}
-    fitted = []
-    for name, quantity in quantities_of(estimate).items():
-        value = automaton.parameters[name].value
-        assert value is not None
-        one = coordinates[name]
+    values, fitted = estimate.values(0), []
+    for one in estimate.candidate.free_parameters:
+        if one.per_recording:
+            continue
+        declared = automaton.parameters[one.name].value
+        assert declared is not None
+        quantity = Quantity(values[one.name], one.unit, stds[one.name])
         left, note = prior_std_ratio(quantity, one), parameter_note(quantity, one)
-        fitted.append(
-            FittedParameter(name, float(value), quantity, left, note, strongest.get(name))
-        )
+        pair = strongest.get(one.name)
+        fitted.append(FittedParameter(one.name, float(declared), quantity, left, note, pair))
     return tuple(fitted)
 
 
