@@ -29,7 +29,7 @@ _cache: OrderedDict[tuple[int, ...], StackedExperiments] = OrderedDict()
 
 
 def burn_in_samples(series: SampledRecording) -> int:
-    """Return the samples of the burn-in, at least 1, which may exceed those of a short recording."""
+    """Return the samples of the burn-in, at least 1; a short recording may have fewer."""
     return series.sample_count(series.burn_in)
 
 
