@@ -177,21 +177,20 @@ def sample_recording(
     count = int((end - start) / step + MAX_SLIP) + 1
     if count < 2:
         raise UnusableRecordingError(f"{recording.name}: only {max(count, 0)} samples in common")
-    columns = [
-        _sample_input(driven[name], start, step, count)
-        if name in driven
-        else np.full(count, defaults[name])
-        for name in inputs
-    ]
+    input_values = np.empty((count, len(inputs)))
+    for column, name in zip(input_values.T, inputs, strict=True):
+        channel = driven.get(name)
+        column[:] = _sample_input(channel, start, step, count) if channel else defaults[name]
     measured = [_sample_output(seen.get(name), start, step, count) for name in output_names]
     return SampledRecording(
         recording.name,
         step,
         start,
-        np.stack(columns, axis=1),
+        input_values,
         np.stack(measured, axis=1),
         holds=tuple(
-            _hold_of(driven.get(name), column) for name, column in zip(inputs, columns, strict=True)
+            _hold_of(driven.get(name), column)
+            for name, column in zip(inputs, input_values.T, strict=True)
         ),
     )
 

@@ -100,10 +100,9 @@ def find_long_pauses(recording: Recording) -> list[Finding]:
         every = np.unique(np.concatenate(stamps or [np.zeros(0)]))
         for k in np.flatnonzero(np.diff(every) >= least)[:1]:
             start, end = float(every[k]), float(every[k + 1])
-            text = (
-                f"time leaps from {start:.6g} s to {end:.6g} s ({_format_duration(end - start)}): "
-            )
-            text += "a wrong time stamp, or two recordings in one file"
+            leap = f"{start:.6g} s to {end:.6g} s ({_format_duration(end - start)})"
+            why = "a wrong time stamp, or two recordings in one file"
+            text = f"time leaps from {leap}: {why}"
             found.append(Finding("leap", recording.name, "", text, "error", (start, end)))
     return found
 

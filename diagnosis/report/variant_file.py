@@ -9,13 +9,13 @@ from codegen.toolchain.templates import product_version
 from diagnosis.estimation.covariance import quantities_of
 from diagnosis.estimation.quantity import Quantity
 from diagnosis.model.parameter import format_value
-from diagnosis.model.placed_effect import automaton_with_effects
+from diagnosis.model.placed_effect import automaton_with_effects, effect_names
 from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.report_text import format_two_digits
 from diagnosis.selection.candidate_search import CandidateFit
 from diagnosis.selection.forward_selection import Selection
 from language.model.automaton import Automaton
-from language.overlays.effect_reader import Effect, added_names
+from language.overlays.effect_reader import Effect
 from language.overlays.expand_document import read_document
 from language.text.document import MappingNode
 from language.text.node_edit import mapping_entries
@@ -121,20 +121,19 @@ def _single_effect_lines(
     too: a variant has no recordings.
     """
     placed_effect = candidate_fit.placed_effect
-    own_names = added_names(placed_effect.effect.body)
+    own_names = effect_names(placed_effect)
     lines = [f"  {placed_effect.id}:  # {placed_effect.effect.about}"]
     each = [selection.model.values(k) for k in range(len(selection.model.point.per_recording))]
     values = []
     for final, quantity in fitted.items():
-        own = final.removesuffix(f"_{placed_effect.suffix}")
         parameter = whole.parameters.get(final)
-        if own not in own_names or placed_effect.qualified_name(own) != final or parameter is None:
+        if final not in own_names or parameter is None:
             continue
         text = format_value(quantity.value, parameter)
         note = f"sd {format_two_digits(quantity.std)}"
         if parameter.fitting.per == "recording":
             note = "mean of " + ", ".join(f"{one[final]:.4g}" for one in each)
-        values.append(f"      {own}: {text}  # {note}")
+        values.append(f"      {own_names[final]}: {text}  # {note}")
     for entry in mapping_entries(placed_effect.effect.body.get("parameters")):
         final = placed_effect.qualified_name(entry.key)
         parameter = whole.parameters.get(final)

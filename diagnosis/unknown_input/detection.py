@@ -114,27 +114,25 @@ def _refit_on_inactive_intervals(
     """
     least = _energy_level([one.values for one in location.disturbances])
     is_inactive = [np.abs(one.values) < least for one in location.disturbances]
-    free_model = refit_on_inactive_intervals(
-        free_model, model_set.series, [~one for one in is_inactive], location.disturbance_state
-    )
-    location = with_smoothed_disturbances(
-        model_set, dataclasses.replace(location, free_model=free_model, disturbances=())
-    )
-    again = refit_on_inactive_intervals(
-        free_model,
-        model_set.series,
-        [one.is_significant for one in location.disturbances],
-        location.disturbance_state,
-    )
+    series, state = model_set.series, location.disturbance_state
+    active = [~one for one in is_inactive]
+    free_model = refit_on_inactive_intervals(free_model, series, active, state)
+    location = _with_free_model(model_set, location, free_model)
+    active = [one.is_significant for one in location.disturbances]
+    again = refit_on_inactive_intervals(free_model, series, active, state)
     if again.cost < free_model.cost:
-        location = with_smoothed_disturbances(
-            model_set, dataclasses.replace(location, free_model=again, disturbances=())
-        )
+        location = _with_free_model(model_set, location, again)
     pairs = zip(location.disturbances, is_inactive, strict=True)
     ratios = np.concatenate([np.abs(one.values / one.stds)[rows] for one, rows in pairs])
     scale = max(1.0, MAD_TO_STD * float(np.median(ratios)))
     wider = (DisturbanceEstimate(one.values, scale * one.stds) for one in location.disturbances)
     return with_disturbances(model_set, location, tuple(wider))
+
+
+def _with_free_model(model_set: ModelSet, location: Location, free_model: Estimate) -> Location:
+    """Return a location with another fit and its smoothed disturbance."""
+    location = dataclasses.replace(location, free_model=free_model, disturbances=())
+    return with_smoothed_disturbances(model_set, location)
 
 
 def is_intermittent(disturbances: Sequence[Reals]) -> bool:
