@@ -1,7 +1,7 @@
 """Parameter fit: parameters of an automaton from recordings, with their uncertainties.
 
-Properties of single recordings, such as initial states and slow disturbances, are absorbed by the
-observer that predicts one sample ahead.
+Properties of single recordings are fitted, such as initial states, or absorbed by an observer, such
+as slow disturbances (`fit_full_rate`).
 """
 
 from __future__ import annotations
