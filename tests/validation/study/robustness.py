@@ -202,7 +202,8 @@ def _arguments(
     if command == "check":
         spec = ["--spec", machine.spec] if draw.random() < 0.7 else []
         files = [*names["--train"], *names["--held-out"]]
-        return ["recording", "check", *files, *mapping, *spec, *as_json], []
+        plot = ["--plot", "check.png"] if draw.random() < 0.4 else []
+        return ["recording", "check", *files, *mapping, *spec, *as_json, *plot], []
     files = [word for name in names["--train"] for word in ("--train", name)]
     options = [*mapping, *(["--anyway"] if anyway else []), *as_json]
     if command == "fit":
