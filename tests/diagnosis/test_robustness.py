@@ -8,7 +8,7 @@ import pytest
 
 from modewright.cli.app import build_application, expand_arguments
 from modewright.cli.common.exit_codes import run_with_exit_code
-from tests.validation.study.robustness import draw_pair, find_failures, write_files
+from tests.validation.properties.robustness import draw_pair, find_failures, write_files
 
 SEED = 1
 CHEAP = (2, 7, 10, 15, 17, 18, 19, 21, 23, 25, 26)

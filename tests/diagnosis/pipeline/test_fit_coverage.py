@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from tests.validation.study.fit_coverage import (
+from tests.validation.properties.fit_coverage import (
     ParameterResult,
     fit_machine,
     random_machine,

@@ -10,9 +10,9 @@ import pytest
 
 from diagnosis.model.placed_effect import read_effects
 from tests.diagnosis.rotor_project import SPEC, write_project
-from tests.validation.study.case_decision import decide_case
-from tests.validation.study.case_transformations import TRANSFORMATIONS
-from tests.validation.study.invariance import difference
+from tests.validation.properties.case_decision import decide_case
+from tests.validation.properties.case_transformations import TRANSFORMATIONS
+from tests.validation.properties.invariance import difference
 
 BY_NAME = {one.name: one for one in TRANSFORMATIONS}
 

@@ -13,13 +13,13 @@ from language.loading.load import automaton_of
 from language.loading.recording_map_reader import read_map
 from language.model.automaton import Automaton
 from language.overlays.expand_document import Project, read_document
-from tests.validation.study.case_transformations import (
+from tests.validation.properties.case_transformations import (
     TRANSFORMATIONS,
     NotWritableError,
     read_table,
     unit_factor,
 )
-from tests.validation.study.invariance import UNCHANGED, difference
+from tests.validation.properties.invariance import UNCHANGED, difference
 
 SPEC = """\
 language: 1

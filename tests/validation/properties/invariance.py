@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.validation.evidence.evidence_store import ROOT
-from tests.validation.study.case_transformations import (
+from tests.validation.properties.case_transformations import (
     TRANSFORMATIONS,
     NotWritableError,
     Transformation,
@@ -41,9 +41,9 @@ GROUPS = ("full", "clean")
 Decision = Mapping[str, Any]
 EXAMPLES = """\
 # two cases of each generator, all transformations
-python -m tests.validation.study.invariance --cases 2
+python -m tests.validation.properties.invariance --cases 2
 # a case of a folder with GENERATOR/CASE, one transformation
-python -m tests.validation.study.invariance --folder cases --cases relay_plants/case_000 \\
+python -m tests.validation.properties.invariance --folder cases --cases relay_plants/case_000 \\
     --transformations files"""
 
 
@@ -133,7 +133,7 @@ def transform_and_decide(case: Path, transformation: Transformation) -> dict[str
         except NotWritableError as error:
             return {"skipped": str(error)}
         options = ["--reverse-effects"] if transformation.reverses_effects else []
-        module = "tests.validation.study.case_decision"
+        module = "tests.validation.properties.case_decision"
         done = subprocess.run(
             [sys.executable, "-m", module, str(copy), str(result), *options],
             cwd=ROOT,
@@ -242,7 +242,7 @@ def _gain(decision: Decision) -> float:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m tests.validation.study.invariance",
+        prog="python -m tests.validation.properties.invariance",
         description=__doc__,
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,

@@ -1,6 +1,6 @@
 """Case decision: the decision on one case by a process of its own, without report and held-out.
 
-python -m tests.validation.study.case_decision CASE RESULT [--reverse-effects]
+python -m tests.validation.properties.case_decision CASE RESULT [--reverse-effects]
 """
 
 from __future__ import annotations

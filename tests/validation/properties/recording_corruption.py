@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from random import Random
 
-from tests.validation.study.recorded_machine import Machine, Table, read_real, record
+from tests.validation.properties.recorded_machine import Machine, Table, read_real, record
 
 FACTORS = (-1.0, 1e-3, 0.10472, 0.0174533, 3.6, 9.5493, 57.2958, 1e3)
 """Factors of wrong signs and units."""

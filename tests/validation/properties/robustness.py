@@ -26,8 +26,8 @@ from pathlib import Path
 from random import Random
 
 from tests.validation.evidence.evidence_store import ROOT
-from tests.validation.study.recorded_machine import Machine, Table, machines
-from tests.validation.study.recording_corruption import (
+from tests.validation.properties.recorded_machine import Machine, Table, machines
+from tests.validation.properties.recording_corruption import (
     CORRUPTIONS,
     Draft,
     draw_recording,
@@ -35,11 +35,11 @@ from tests.validation.study.recording_corruption import (
 
 EXAMPLES = """\
 # 300 pairs; the same command continues
-python -m tests.validation.study.robustness --pairs 300 --seed 1
+python -m tests.validation.properties.robustness --pairs 300 --seed 1
 # with real machines, results as JSON
-python -m tests.validation.study.robustness --pairs 300 --recordings DIR --json
+python -m tests.validation.properties.robustness --pairs 300 --recordings DIR --json
 # one pair again, with its files and its output
-python -m tests.validation.study.robustness --seed 1 --only 17 --keep build/pair"""
+python -m tests.validation.properties.robustness --seed 1 --only 17 --keep build/pair"""
 COMMANDS = ("diagnose", "diagnose", "diagnose", "fit", "check", "python")
 """Commands of a pair; `python` is the function of the package."""
 FOLDER = ROOT / "build" / "robustness"
@@ -369,7 +369,7 @@ def _format(outcome: Outcome) -> str:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m tests.validation.study.robustness",
+        prog="python -m tests.validation.properties.robustness",
         description=__doc__,
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,

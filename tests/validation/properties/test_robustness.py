@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.validation.study.recording_corruption import CORRUPTIONS
-from tests.validation.study.robustness import (
+from tests.validation.properties.recording_corruption import CORRUPTIONS
+from tests.validation.properties.robustness import (
     JSON_OUTPUT,
     Outcome,
     Pair,
