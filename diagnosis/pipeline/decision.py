@@ -10,7 +10,12 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
-from diagnosis.criterion.explained_share import USUAL_FORM_ERROR, explained_share
+from diagnosis.criterion.explained_share import (
+    USUAL_FORM_ERROR,
+    explained_share,
+    is_ordinary,
+    remaining_energy,
+)
 from diagnosis.criterion.threshold import Thresholds
 from diagnosis.equation.discovery import DiscoveredEquation, discover_equation
 from diagnosis.estimation.estimate import Estimate
@@ -56,7 +61,8 @@ def decide(case: Case, full_rate_set: ModelSet, log: LogCallback) -> DiagnosisDe
 
     Models predict each sample from those before it. A base that forgets its initial state is
     simulated over whole recordings first. If effects explain that but for the error of their form,
-    they are the result. Else prediction is tried as well; if it names another effect, the one that
+    they are the result. If no effect explains it and it is no more than an ordinary disturbance,
+    nothing is missing. Else prediction is tried as well; if it names another effect, the one that
     simulates better decides.
     """
     model_set, base = fit_base(full_rate_set, log)
@@ -72,7 +78,8 @@ def decide(case: Case, full_rate_set: ModelSet, log: LogCallback) -> DiagnosisDe
     simulated = DiagnosisDecision(
         simulated_set, selection, locations, _outcome_of(selection, simulated_set), case.thresholds
     )
-    if share >= 1.0 - USUAL_FORM_ERROR**2:
+    is_found = share >= 1.0 - USUAL_FORM_ERROR**2
+    if is_found or (not selection.accepted and _is_ordinary(selection.base)):
         return simulated
     log(f"effects explain {share:.0%} of the simulations: prediction is tried")
     known = frozenset(one.placed_effect.id for one in selection.accepted)
@@ -81,6 +88,12 @@ def decide(case: Case, full_rate_set: ModelSet, log: LogCallback) -> DiagnosisDe
     if is_simulated and not _simulates_better(found, selection, predicted.selection):
         return simulated
     return predicted
+
+
+def _is_ordinary(base: Estimate) -> bool:
+    """Return whether a simulated base leaves no more than an ordinary disturbance."""
+    energy = remaining_energy(base, base.noise_levels.outputs**2)
+    return is_ordinary(energy, len(base.noise_levels.outputs))
 
 
 def _simulates_better(found: OutputErrorFit, simulated: Selection, predicted: Selection) -> bool:
