@@ -8,7 +8,12 @@ from dataclasses import dataclass
 from language.expressions.text_rewrite import split_balance
 from language.expressions.units import RADIAN, SECOND, Dimension, are_compatible
 from language.overlays.effect_reader import ELEMENT_PARTS, Effect, PlacePattern
-from language.overlays.name_types import TreeTypes, format_si_unit, formula_entries
+from language.overlays.name_types import (
+    TreeTypes,
+    format_rate_unit,
+    format_si_unit,
+    formula_entries,
+)
 from language.readers.element_reader import outputs_as_mapping
 from language.text.diagnostic import suggest_name
 from language.text.document import MappingNode, ScalarNode
@@ -145,7 +150,7 @@ def _signal_place(
         return PlaceMismatch(f"`{name}` is in `{kind}`, not in `{pattern.unit}`")
     units = {
         "unit": format_si_unit(kind),
-        "unit_rate": format_si_unit(_multiply_dimensions(kind, SECOND, -1)),
+        "unit_rate": format_rate_unit(kind, _multiply_dimensions(kind, SECOND, -1)),
     }
     return EffectPlace(name, {hole: read_name, **units, **_declared_holes(tree, known, name)})
 

@@ -141,7 +141,17 @@ def dimension_of_unit(text: str) -> Dimension | None:
 
 def format_si_unit(dimension: Dimension) -> str:
     """Return the SI unit of a dimension as a spec writes it; an undefined angle counts as 0."""
-    return str(Dimension(dimension.powers, dimension.angle or 0))
+    return Dimension(dimension.powers, dimension.angle or 0).display_name
+
+
+def format_rate_unit(quantity: Dimension, rate: Dimension) -> str:
+    """Return the SI unit of the rate of a quantity: `N*m/s` and not `W` for that of a torque.
+
+    `rate` is the dimension of the rate. It gives the text if the unit of the quantity is a quotient
+    or 1.
+    """
+    text = format_si_unit(quantity)
+    return format_si_unit(rate) if text == "1" or "/" in text else f"{text}/s"
 
 
 def _derivative_coefficient(left: SyntaxTree) -> SyntaxTree | None:
