@@ -109,8 +109,25 @@ def local_models(
         )
         for place, variance in disturbance_variances.items():
             q[place, place] = variance
-        models[mode] = LocalModel(linear, q, INITIAL_STD_FRACTION * uncertain_ranges, stay)
+        initial_std = _initial_std(candidate, noise_levels, uncertain_ranges)
+        models[mode] = LocalModel(linear, q, initial_std, stay)
     return models
+
+
+def _initial_std(candidate: Candidate, noise_levels: NoiseLevels, ranges: Reals) -> Reals:
+    """Return the standard deviations of the states at the start (states,).
+
+    A compared state starts at its first measurement, so it is uncertain by the noise. A disturbance
+    is stationary, and `INITIAL_STD_FRACTION` of the ranges applies to other states.
+    """
+    known = dict(zip(candidate.predictor.outputs, noise_levels.outputs.tolist(), strict=True))
+    known |= {
+        name: noise_levels.process[name]
+        for name in candidate.disturbance_states
+        if name in noise_levels.process
+    }
+    pairs = zip(candidate.predictor.states, INITIAL_STD_FRACTION * ranges, strict=True)
+    return np.array([known.get(name, std) for name, std in pairs])
 
 
 def _is_effect_integrator(candidate: Candidate, linear: LinearModel) -> NDArray[np.bool_]:

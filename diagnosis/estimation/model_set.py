@@ -8,12 +8,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.checkpoint import NO_CACHE, FitCache
 from diagnosis.estimation.estimate import Estimate
+from diagnosis.estimation.signal_magnitude import balance_coefficient, signal_magnitudes
 from diagnosis.model.candidate import Candidate, compile_candidate
 from diagnosis.model.placed_effect import (
     PlacedEffect,
@@ -23,11 +25,10 @@ from diagnosis.model.placed_effect import (
 )
 from language.expressions.units import parse_unit
 from language.model.automaton import Automaton
-from language.overlays.effect_place import PlaceMismatch, find_effect_place
 from language.overlays.effect_reader import Effect
 from language.overlays.expand_document import Project
 from language.text.diagnostic import SpecError
-from language.text.document import Document, MappingNode
+from language.text.document import Document
 
 FitFunction = Callable[[], Estimate]
 NO_STORAGE = (parse_unit("1").dimension.powers, parse_unit("s").dimension.powers)
@@ -70,6 +71,11 @@ class ModelSet:
         """The time [s] between samples of the first recording, which all recordings have."""
         return self.series[0].period
 
+    @cached_property
+    def magnitudes(self) -> dict[tuple[int, ...], float]:
+        """The magnitudes [SI] of signals by the powers of their units (`signal_magnitudes`)."""
+        return signal_magnitudes(self.document, self.automaton, self.series, self.output_names)
+
     def compile_candidate(
         self,
         placed_effects: Sequence[PlacedEffect],
@@ -85,7 +91,7 @@ class ModelSet:
             f"{one.id} {sorted(one.scales.items())}" for one in (*placed_effects, *disturbances)
         )
         if key not in self._compiled:
-            self._compiled[key] = compile_candidate(
+            candidate = compile_candidate(
                 self.document,
                 self.project,
                 placed_effects,
@@ -93,6 +99,7 @@ class ModelSet:
                 self.output_names,
                 self.period,
             )
+            self._compiled[key] = dataclasses.replace(candidate, magnitudes=self.magnitudes)
         return self._compiled[key]
 
     def applicable_effects(self) -> Iterator[PlacedEffect]:
@@ -169,9 +176,5 @@ def _is_storage_balance(document: Document, name: str) -> bool:
     """Return whether the state `name` has a balance in which der(x) has a coefficient with a unit:
     a mass, an inertia, a heat capacity, an inductance, but not a time.
     """
-    place = find_effect_place(document.root, disturbance_effect("balance", name).effect, name)
-    flow = document.root.get("flow")
-    if isinstance(place, PlaceMismatch) or not isinstance(flow, MappingNode):
-        return False
-    unit = place.holes.get("inertia_unit")
-    return unit is not None and parse_unit(str(unit)).dimension.powers not in NO_STORAGE
+    coefficient = balance_coefficient(document, name)
+    return coefficient is not None and coefficient[1] not in NO_STORAGE

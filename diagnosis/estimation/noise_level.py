@@ -29,8 +29,8 @@ def disturbance_units(
     """Return the unit [SI] of each disturbance state, by name.
 
     One unit changes some output by its measured noise after the median reference time, by the model
-    linearised at the start of a recording; of several recordings it is the median. It is at most
-    1e12 for a disturbance without response. `start` are values [SI] of parameters. Raises
+    linearised at the start of a recording; of several recordings it is the median. A disturbance
+    without response has the magnitude of its unit. `start` are values [SI] of parameters. Raises
     UnusableRecordingError if the model cannot be linearised at the start of any recording.
     """
     output_noise = measured_noise_levels(series, {}).outputs
@@ -49,5 +49,6 @@ def disturbance_units(
     units = {}
     for name in candidate.disturbance_states:
         place = candidate.predictor.states.index(name)
-        units[name] = 1.0 / max(float(response[place]), 1e-12)
+        size = float(response[place])
+        units[name] = 1.0 / size if size > 0.0 else float(candidate.state_ranges[place])
     return units

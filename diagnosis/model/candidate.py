@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 
@@ -42,11 +42,15 @@ INITIAL_STD_FRACTION = 0.01
 
 @dataclass(frozen=True)
 class Candidate:
-    """A compiled model: the effects placed on the base, its metadata and its predictor."""
+    """A compiled model: the effects placed on the base, its metadata and its predictor.
+
+    `magnitudes` are those of signals [SI] by the powers of their units, for states without a range.
+    """
 
     placed_effects: tuple[PlacedEffect, ...]
     compiled: CompiledModel
     predictor: Predictor
+    magnitudes: Mapping[tuple[int, ...], float] = field(default_factory=dict, repr=False)
 
     @property
     def free_parameters(self) -> tuple[FreeParameter, ...]:
@@ -65,8 +69,12 @@ class Candidate:
 
     @cached_property
     def state_ranges(self) -> Reals:
-        """The width (high - low, SI) of the range of each state (states,), 1 if it has no range."""
-        return np.array(self.compiled.state_ranges)
+        """The width (high - low, SI) of the range of each state (states,).
+
+        A state without a range has the magnitude of its unit, 1 if that is not known.
+        """
+        pairs = zip(self.compiled.state_ranges, self.compiled.state_dimensions, strict=True)
+        return np.array([width or self.magnitudes.get(powers, 1.0) for width, powers in pairs])
 
     @cached_property
     def is_effect_state(self) -> NDArray[np.bool_]:
@@ -186,7 +194,7 @@ def _compile(
     recipe = CompiledModel(
         columns,
         substeps,
-        tuple(float(r[1] - r[0]) if r else 1.0 for r in ranges),
+        tuple(float(r[1] - r[0]) if r else 0.0 for r in ranges),
         uncertain,
         tuple(one.qualified_name(DISTURBANCE_STATE) for one in disturbances),
         tuple(
@@ -195,6 +203,7 @@ def _compile(
         ),
         _delay_parameters(automaton),
         tuple(name in effect_parameters for name in columns.states),
+        tuple(automaton.states[name].unit.dimension.powers for name in columns.states),
     )
     with build_predictor(program, columns) as library:
         return recipe, library.read_bytes()

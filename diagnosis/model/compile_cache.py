@@ -46,7 +46,8 @@ class CompiledModel:
     """Metadata of a compiled candidate without its library; it is stored as JSON.
 
     `substeps` is the number of major steps in a sample, `state_ranges` (states,) are the widths of
-    ranges, `memories` [s] the correlation times of disturbances, `delays` the parameters of delays.
+    ranges, 0 without one, `state_dimensions` the powers of units, `memories` [s] the correlation
+    times of disturbances, `delays` the parameters of delays.
     """
 
     columns: PredictorColumns
@@ -57,6 +58,7 @@ class CompiledModel:
     memories: tuple[float, ...]
     delays: tuple[str, ...] = ()
     is_effect_state: tuple[bool, ...] = ()
+    state_dimensions: tuple[tuple[int, ...], ...] = ()
 
 
 def cache_key(*parts: str) -> str:
@@ -135,8 +137,9 @@ def _from_json(data: dict[str, Any]) -> CompiledModel:
     """Return the metadata that a JSON object of the cache holds."""
     free_parameters = tuple(FreeParameter(**_with_tuples(one)) for one in data["free_parameters"])
     columns = PredictorColumns(**_with_tuples(data["columns"]))
+    powers = tuple(tuple(one) for one in data["state_dimensions"])
     given = {**_with_tuples(data), "columns": columns, "free_parameters": free_parameters}
-    return CompiledModel(**given)
+    return CompiledModel(**{**given, "state_dimensions": powers})
 
 
 def _with_tuples(data: dict[str, Any]) -> dict[str, Any]:
