@@ -23,7 +23,12 @@ from diagnosis.estimation.estimate import (
 from diagnosis.estimation.innovations import measured_noise_levels
 from diagnosis.estimation.levenberg_marquardt import estimate_parameters, refine
 from diagnosis.estimation.model_set import ModelSet
-from diagnosis.model.candidate import INITIAL_OFFSET_NAME, Candidate, compile_candidate
+from diagnosis.model.candidate import (
+    INITIAL_OFFSET_NAME,
+    INITIAL_STD_FRACTION,
+    Candidate,
+    compile_candidate,
+)
 from diagnosis.model.parameter import FreeParameter, with_range_prior
 from diagnosis.model.parameter_vector import vector_of
 
@@ -115,19 +120,22 @@ def _fit_output_error(
     """
     measured = measured_noise_levels(series, {})
     levels = dataclasses.replace(measured, is_output_error=True, gain_scale=0.0)
-    noise = {
-        INITIAL_OFFSET_NAME.format(name): float(std)
-        for name, std in zip(model_set.output_names, measured.outputs, strict=True)
-    }
+    known = dict(zip(model_set.output_names, measured.outputs.tolist(), strict=True))
     states = tuple(one.name for one in model_set.automaton.states.values() if one.type == "real")
     candidate = _compile(model_set, series, states, False)
-    offsets = [
-        dataclasses.replace(one, prior_std=noise.get(one.name, one.prior_std))
-        if one.per_recording
-        else one
-        for one in candidate.free_parameters
-    ]
-    candidate = _with_parameters(candidate, offsets)
+    columns = candidate.predictor.states
+    offsets = {}
+    for name in states:
+        width = float(candidate.state_ranges[columns.index(name)])
+        std = known.get(name, INITIAL_STD_FRACTION * width)
+        offsets[INITIAL_OFFSET_NAME.format(name)] = {"low": -width, "high": width, "prior_std": std}
+    candidate = _with_parameters(
+        candidate,
+        [
+            dataclasses.replace(one, **offsets.get(one.name, {}))
+            for one in candidate.free_parameters
+        ],
+    )
 
     def start_of(values: Values) -> Estimate:
         point = vector_of(candidate, len(series), values)
@@ -191,7 +199,8 @@ def _compile(
     usual = compile_candidate(*parts, series[0].period, offset_states)
     is_linear = any(np.any(one.linear_inputs) for one in series)
     substeps = (LINEAR_SUBSTEPS if is_linear else HELD_SUBSTEPS) * usual.compiled.substeps
-    return _with_range_priors(compile_candidate(*parts, series[0].period, offset_states, substeps))
+    candidate = compile_candidate(*parts, series[0].period, offset_states, substeps)
+    return _with_range_priors(dataclasses.replace(candidate, magnitudes=model_set.magnitudes))
 
 
 def _with_range_priors(candidate: Candidate) -> Candidate:
