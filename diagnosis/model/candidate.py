@@ -71,10 +71,17 @@ class Candidate:
     def state_ranges(self) -> Reals:
         """The width (high - low, SI) of the range of each state (states,).
 
-        A state without a range has the magnitude of its unit, 1 if that is not known.
+        A state without a range has the magnitude of its unit, 1 if that is not known. One that an
+        effect adds has 1: a far off initial value could stand for another effect.
         """
-        pairs = zip(self.compiled.state_ranges, self.compiled.state_dimensions, strict=True)
-        return np.array([width or self.magnitudes.get(powers, 1.0) for width, powers in pairs])
+        one = self.compiled
+        parts = zip(one.state_ranges, one.state_dimensions, one.is_effect_state, strict=True)
+        return np.array(
+            [
+                width or (1.0 if is_added else self.magnitudes.get(powers, 1.0))
+                for width, powers, is_added in parts
+            ]
+        )
 
     @cached_property
     def is_effect_state(self) -> NDArray[np.bool_]:
