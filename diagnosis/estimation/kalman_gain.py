@@ -117,17 +117,13 @@ def local_models(
 def _initial_std(candidate: Candidate, noise_levels: NoiseLevels, ranges: Reals) -> Reals:
     """Return the standard deviations of the states at the start (states,).
 
-    A compared state starts at its first measurement, so it is uncertain by the noise. A disturbance
-    is stationary, and `INITIAL_STD_FRACTION` of the ranges applies to other states.
+    They are `INITIAL_STD_FRACTION` of the ranges, and of the standard deviations of disturbances.
     """
-    known = dict(zip(candidate.predictor.outputs, noise_levels.outputs.tolist(), strict=True))
-    known |= {
-        name: noise_levels.process[name]
-        for name in candidate.disturbance_states
-        if name in noise_levels.process
-    }
-    pairs = zip(candidate.predictor.states, INITIAL_STD_FRACTION * ranges, strict=True)
-    return np.array([known.get(name, std) for name, std in pairs])
+    sizes = ranges.copy()
+    for name in candidate.disturbance_states:
+        place = candidate.predictor.states.index(name)
+        sizes[place] = noise_levels.process.get(name, sizes[place])
+    return INITIAL_STD_FRACTION * sizes
 
 
 def _is_effect_integrator(candidate: Candidate, linear: LinearModel) -> NDArray[np.bool_]:
