@@ -19,7 +19,7 @@ from diagnosis.data.sampled_recording import has_feedthrough
 from diagnosis.data.time_resolution import time_resolution
 from language.expressions.units import parse_unit
 from language.ir.program import Program
-from language.loading.load import automaton_of, lower_automaton
+from language.loading.load import automaton_of, program_of
 from language.lowering.delay_buffers import memory_calls_by_key, uses_function
 from language.model.automaton import Automaton
 from language.overlays.apply_effect import apply_effect
@@ -27,7 +27,6 @@ from language.overlays.effect_place import PlaceMismatch, find_effect_place
 from language.overlays.effect_reader import Effect, EffectApplication, added_names, read_effect
 from language.overlays.expand_document import Project, read_document
 from language.overlays.name_types import formula_entries
-from language.passes.constant_folding import eliminate_redundancy, fold_parameters
 from language.text.diagnostic import Problems, Source, Span
 from language.text.document import Document
 
@@ -152,8 +151,7 @@ def lower_tunable_program(
     The step divides the period into `min_substeps` to `MAX_STEPS` (40) parts. It is at most
     `MAX_STEP` or the period, and the `time_resolution` with `effect_parameters` at a quarter and
     four times their values, and any nonzero time among these: the eigenvalue of a limited rate is
-    not known beforehand. Expressions of inputs are not hoisted (`hoist_inputs`), because a
-    predictor changes inputs between two latches (first-order hold).
+    not known beforehand.
     """
     scaled = [
         _scale_parameters(automaton, effect_parameters, factor)
@@ -169,8 +167,7 @@ def lower_tunable_program(
         for name, parameter in automaton.parameters.items()
     }
     with_tunables = dataclasses.replace(automaton, parameters=parameters, step=period / substeps)
-    program = lower_automaton(with_tunables)
-    return eliminate_redundancy(fold_parameters(program)), int(substeps)
+    return program_of(with_tunables), int(substeps)
 
 
 def _time_values(automaton: Automaton, names: Sequence[str]) -> list[Fraction]:
