@@ -50,7 +50,7 @@ def kalman_gains(
     time, starting from the steady covariance: a short stay, as in a gap, does not reach a steady
     state. Modes without an
     operating point or a valid gain have the gain of the first mode that has one (0 if none has).
-    Without `prediction` the only operating point is the start of the longest recording. With the
+    Without `prediction` the only operating point is the start of the first recording. With the
     output-error criterion the steady gains are 0, the transient is not.
     """
     count = min(burn_in_samples(one) for one in series)

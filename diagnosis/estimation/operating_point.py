@@ -112,13 +112,12 @@ def operating_points(
     the measured outputs are largest, relative to their largest magnitudes, because friction is
     steep near standstill. Of several longest stays it is the one with the largest outputs there.
     Modes whose stays are all shorter than `MIN_DWELL_SAMPLES` (5) are left out. Without a
-    prediction the result is the start of the longest recording in its mode, at declared parameter
+    prediction the result is the start of the first recording in its mode, at declared parameter
     values.
     """
     input_sizes = np.max([one.largest_inputs for one in series], axis=0)
     if prediction is None:
-        longest = max(series, key=lambda one: one.count)
-        return _initial_operating_point(candidate, longest, input_sizes)
+        return _initial_operating_point(candidate, series[0], input_sizes)
     output_sizes = np.max([one.largest_measured for one in series], axis=0)
     points = {}
     runs = prediction.runs
