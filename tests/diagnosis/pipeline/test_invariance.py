@@ -36,7 +36,10 @@ def before(project: Path) -> dict[str, Any]:
     return decide_case(project / "case", effects=read_effects(project / "library"))
 
 
-@pytest.mark.parametrize("name", ["files", "effects", "names", "prefixes", "scale_kg", "scale_m"])
+LONG = [pytest.param(name, marks=pytest.mark.long) for name in ("effects", "names", "scale_kg")]
+
+
+@pytest.mark.parametrize("name", ["files", "prefixes", "scale_m", *LONG])
 def test_a_rotor_that_is_written_differently_lacks_the_same(
     name: str, project: Path, before: dict[str, Any], tmp_path: Path
 ) -> None:
