@@ -48,10 +48,9 @@ def kalman_gains(
     The mode with the longest stay has the steady-state gain, and its transient is used during the
     shortest burn-in of a recording. The gain of another mode is the one after its median dwell
     time, starting from the steady covariance: a short stay, as in a gap, does not reach a steady
-    state. Modes without an
-    operating point or a valid gain have the gain of the first mode that has one (0 if none has).
-    Without `prediction` the only operating point is the start of the first recording. With the
-    output-error criterion the steady gains are 0, the transient is not.
+    state. Modes without an operating point or a valid gain have the gain of the first mode that has
+    one (0 if none has). Without `prediction` the only operating point is the start of the first
+    recording. With the output-error criterion the steady gains are 0, the transient is not.
     """
     count = min(burn_in_samples(one) for one in series)
     steady_by_mode: dict[int, Reals] = {}

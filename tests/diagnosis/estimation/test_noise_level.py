@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from diagnosis.data.sampled_recording import SampledRecording
-from diagnosis.estimation.innovations import measured_noise_levels
+from diagnosis.estimation.innovations import measured_noise_levels, predict
 from diagnosis.estimation.kalman_gain import kalman_gains
 from diagnosis.estimation.noise_level import disturbance_units
 from diagnosis.model.candidate import Candidate, compile_candidate
@@ -55,10 +55,12 @@ def test_the_order_of_recordings_does_not_change_units_and_gains(fan: Candidate)
     """The drag at 40 rad/s damps a disturbance; the burn-in of a short recording is shorter."""
     series = [recording(0.0, 700), recording(40.0, 500), recording(10.0, 200)]
     units, gains = [], []
+    start = kalman_gains(fan, series, {}, measured_noise_levels(series, {"drift_balance_w": 0.0}))
     for some in (series, series[::-1]):
         units.append(disturbance_units(fan, some, {}))
         levels = measured_noise_levels(some, units[-1])
-        gains.append(kalman_gains(fan, some, {}, levels))
+        prediction = predict(fan, some, [{}] * len(some), start, levels.huber_limits)
+        gains.append(kalman_gains(fan, some, {}, levels, prediction))
     alone = disturbance_units(fan, series[:1], {}), disturbance_units(fan, series[1:2], {})
     (name,) = units[0]
     assert alone[1][name] > 1.5 * alone[0][name]
