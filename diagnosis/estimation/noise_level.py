@@ -44,7 +44,8 @@ def disturbance_units(
             ahead = linear.c @ np.linalg.matrix_power(linear.phi, count)
             responses.append(np.max(np.abs(ahead) / output_noise[:, np.newaxis], axis=0))
     if not responses:
-        raise UnusableRecordingError("the model is unstable where the recordings start")
+        names = ", ".join(one.name for one in series)
+        raise UnusableRecordingError(f"{names}: the model is unstable where the recordings start")
     response = np.median(responses, axis=0)
     units = {}
     for name in candidate.disturbance_states:

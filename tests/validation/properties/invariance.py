@@ -183,9 +183,9 @@ def parameter_shifts(
 
 
 def agreement(transformation: str, found: Iterable[Comparison]) -> float:
-    """Return the part of the cases that agree under a transformation; 1 without any."""
+    """Return the part of the cases that agree under a transformation; 0 without any."""
     own = [one.reason == "" for one in found if one.transformation == transformation]
-    return sum(own) / len(own) if own else 1.0
+    return sum(own) / len(own) if own else 0.0
 
 
 def format_table(some: Sequence[Transformation], found: Sequence[Comparison]) -> str:
