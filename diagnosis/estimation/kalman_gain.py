@@ -49,7 +49,7 @@ def kalman_gains(
     shortest burn-in of a recording. The gain of another mode is the one after its median dwell
     time, starting from the steady covariance: a short stay, as in a gap, does not reach a steady
     state. Modes without an operating point or a valid gain have the gain of the first mode that has
-    one (0 if none has). Without `prediction` the only operating point is the start of the first
+    one (0 if none has). Without `prediction` the only operating point is the start of one
     recording. With the output-error criterion the steady gains are 0, the transient is not.
     """
     count = min(burn_in_samples(one) for one in series)

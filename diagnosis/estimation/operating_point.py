@@ -112,13 +112,13 @@ def operating_points(
     the measured outputs are largest, relative to their largest magnitudes, because friction is
     steep near standstill. Of several longest stays it is the one with the largest outputs there.
     Modes whose stays are all shorter than `MIN_DWELL_SAMPLES` (5) are left out. Without a
-    prediction the result is the start of the first recording in its mode, at declared parameter
-    values.
+    prediction the result is the start of the recording with the largest outputs there, at declared
+    parameter values.
     """
     input_sizes = np.max([one.largest_inputs for one in series], axis=0)
-    if prediction is None:
-        return _initial_operating_point(candidate, series[0], input_sizes)
     output_sizes = np.max([one.largest_measured for one in series], axis=0)
+    if prediction is None:
+        return _initial_operating_point(candidate, series, input_sizes, output_sizes)
     points = {}
     runs = prediction.runs
     lows, highs, modes, recordings = _dwell_intervals(runs)
@@ -163,15 +163,19 @@ def _dwell_intervals(runs: StackedPrediction) -> tuple[Integers, Integers, Integ
 
 
 def _initial_operating_point(
-    candidate: Candidate, series: SampledRecording, input_sizes: Reals
+    candidate: Candidate,
+    series: Sequence[SampledRecording],
+    input_sizes: Reals,
+    output_sizes: Reals,
 ) -> dict[int, OperatingPoint]:
-    """Return the operating point at the first sample of a recording, by its mode."""
+    """Return the operating point at the start of the recording with the largest outputs there."""
+    one = max(series, key=lambda one: _largest_output(one.measured, 0, 1, output_sizes)[0])
     predictor = candidate.predictor
-    page = candidate.calibration_page({}, series)
+    page = candidate.calibration_page({}, one)
     none = np.zeros((len(predictor.modes), len(predictor.states), len(predictor.outputs)))
-    short, measured = series.inputs[:2].copy(), series.measured[:2].copy()
+    short, measured = one.inputs[:2].copy(), one.measured[:2].copy()
     run = predictor.predict(
-        page, short, measured, none[:0], none, candidate.compiled.substeps, series.linear_inputs
+        page, short, measured, none[:0], none, candidate.compiled.substeps, one.linear_inputs
     )
     return {int(run.modes[0]): OperatingPoint(run.states[0].copy(), short[0], 1, input_sizes)}
 
