@@ -26,7 +26,7 @@ def acting_rms(model_set: ModelSet, section: str, place: str, model: Estimate) -
     For a balance ("flow") this is its inertia times the rate of the predicted state, for an element
     its elastic torque (stiffness times twist without the gap), both after the burn-in; for an
     output the standard deviation of the measurements, NaN excluded. It is 0 if the inertia or
-    stiffness is no single parameter, or the rate or twist no state.
+    stiffness has no value, or the rate or twist is no state.
     """
     if section == "outputs":
         column = model_set.output_names.index(place)
@@ -81,9 +81,18 @@ def place_bindings(model_set: ModelSet, section: str, place: str) -> dict[str, s
 
 
 def coefficient_value(model_set: ModelSet, model: Estimate, text: str) -> float | None:
-    """Return the value of a coefficient [SI]: fitted if it is a parameter, else as declared."""
+    """Return the value of a coefficient [SI]: fitted if it is a parameter, else at declared
+    parameters and the median states and inputs; None if it has no value.
+    """
     fitted = model.values(0).get(text)
-    return declared_value(model_set.automaton, text) if fitted is None else fitted
+    if fitted is not None:
+        return fitted
+    states = np.concatenate([run.states[: run.completed] for run in model.prediction.predictions])
+    inputs = np.concatenate([one.inputs for one in model_set.series])
+    middle = np.concatenate([np.median(states, axis=0), np.median(inputs, axis=0)])
+    names = [*model.candidate.predictor.states, *model_set.automaton.inputs]
+    point = dict(zip(names, middle.tolist(), strict=True))
+    return declared_value(model_set.automaton, text, point)
 
 
 def rms(values: Reals) -> float:

@@ -42,13 +42,14 @@ def signal_magnitudes(
     )
     found = integrals | recorded
     forces = []
+    middle = _recorded_medians(automaton, series, output_names)
     for name, state in automaton.states.items():
         coefficient = balance_coefficient(document, name)
         unit = state.unit.dimension.powers
         if coefficient is None or unit not in found:
             continue
         text, own = coefficient
-        size = abs(declared_value(automaton, text) or 0.0) * found[unit] / time
+        size = abs(declared_value(automaton, text, middle) or 0.0) * found[unit] / time
         forces.append((_quotient(_product(own, unit), TIME_DIMENSION), size))
     return _largest(forces) | found
 
@@ -80,6 +81,20 @@ def _recorded_spans(
         if state is not None:
             span = _span([one.measured[:, column] for one in series])
             yield state.unit.dimension.powers, span
+
+
+def _recorded_medians(
+    automaton: Automaton, series: Sequence[SampledRecording], output_names: Sequence[str]
+) -> dict[str, float]:
+    """Return the medians [SI] of inputs and of compared states over all recordings."""
+    signals = {
+        name: [one.inputs[:, k] for one in series] for k, name in enumerate(automaton.inputs)
+    }
+    for column, name in enumerate(output_names):
+        signals[automaton.output_source(name)] = [one.measured[:, column] for one in series]
+    known = {name: np.concatenate(parts) for name, parts in signals.items() if parts}
+    known = {name: values[np.isfinite(values)] for name, values in known.items()}
+    return {name: float(np.median(values)) for name, values in known.items() if len(values)}
 
 
 def _span(signals: Sequence[Reals]) -> float:

@@ -8,17 +8,20 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from types import MappingProxyType
 
 from language.expressions.parser import parse_expression
+from language.expressions.syntax_tree import NumberLiteral, SyntaxTree
 from language.expressions.units import Unit
-from language.lowering.constants import evaluate_exactly
+from language.lowering.constants import constant_values, parameter_constants
+from language.lowering.linearisation import LinearisationPoint, inline_equations
 from language.model.automaton import Automaton
-from language.model.declaration import Formula, Parameter
+from language.model.declaration import Parameter
 from language.overlays.name_types import format_si_unit
-from language.text.diagnostic import SpecError
+from language.text.diagnostic import Problems, SpecError
 from language.text.document import ScalarNode
 
 PRIOR_STD = 0.15
@@ -144,14 +147,27 @@ def with_range_prior(one: FreeParameter) -> FreeParameter:
     return dataclasses.replace(one, prior_std=width / math.sqrt(12.0)) if width > 0.0 else one
 
 
-def declared_value(automaton: Automaton, text: str) -> float | None:
-    """Return the value [SI] of a formula of numbers and declared parameters, else None."""
+def declared_value(
+    automaton: Automaton, text: str, point: Mapping[str, float] = MappingProxyType({})
+) -> float | None:
+    """Return the value [SI] of a formula at declared parameters, None if it has none.
+
+    The formula may read equations of the initial mode, and the states and inputs of `point` [SI].
+    """
     if not text:
         return None
-    scalar = ScalarNode(text, automaton.span)
+    here: dict[str, SyntaxTree] = {
+        name: NumberLiteral(Fraction(value), declared.unit, declared.span)
+        for section in (automaton.states, automaton.inputs)
+        for name, declared in section.items()
+        if math.isfinite(value := point.get(name, math.nan))
+    }
     try:
-        return float(evaluate_exactly(Formula(parse_expression(scalar), text), automaton))
-    except SpecError:
+        tree = parse_expression(ScalarNode(text, automaton.span))
+        known = inline_equations(automaton.modes[automaton.initial], here)
+        constants = constant_values(parameter_constants(automaton, Problems()))
+        return float(LinearisationPoint(automaton, constants, known).evaluator(tree))
+    except (SpecError, KeyError, ArithmeticError):
         return None
 
 

@@ -1,10 +1,11 @@
-"""Values of parameters are written in their declared units."""
+"""Values of parameters in their declared units, and values of formulas of a model."""
 
+import math
 from pathlib import Path
 
 import pytest
 
-from diagnosis.model.parameter import format_value
+from diagnosis.model.parameter import declared_value, format_value
 from language.loading.load import load_automaton
 from language.model.automaton import Automaton
 from language.overlays.expand_document import Project
@@ -18,9 +19,12 @@ parameters:
   k: {value: 37.1 N*m/bar, range: [24.12, 55.65]}
   T: {value: 20 degC, range: [0, 40]}
   i_g: {value: 2, range: [1, 3]}
+  J_0: {value: 4 kg*m^2}
+  w_0: {value: 60 rpm}
 inputs: {p: {unit: bar}}
 states: {w: {unit: rad/s, initial: 0 rad/s}}
-flow: {w: 1 kg*m^2 * der(w) = k * p}
+equations: {J: 0.5 * J_0 * (1 + w / w_0)}
+flow: {w: J * der(w) = k * p}
 outputs: [w]
 """
 
@@ -53,3 +57,12 @@ def test_a_value_stays_in_its_range(valve: Automaton) -> None:
     written, unit = format_value(above, valve.parameters["k"]).split()
     assert float(written) <= 55.65
     assert unit == "N*m/bar"
+
+
+def test_a_coefficient_may_depend_on_equations_and_states(valve: Automaton) -> None:
+    assert declared_value(valve, "J_0 / 2") == 2.0
+    assert declared_value(valve, "J") is None
+    at_speed = {"w": 2.0 * math.pi * 3.0, "p": math.nan}
+    assert declared_value(valve, "J", at_speed) == pytest.approx(8.0)
+    assert declared_value(valve, "J * p", at_speed) is None
+    assert declared_value(valve, "unknown", at_speed) is None
