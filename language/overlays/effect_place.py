@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -125,14 +126,21 @@ def _find_output(
 ) -> EffectPlace | PlaceMismatch:
     """Return the output `name` as a place with the hole `y`, the variable that it reads.
 
-    Returns a mismatch if there is no such output.
+    The hole `start` is this variable too if a state may start with it, else 0. Returns a mismatch
+    if there is no such output.
     """
     node = tree.get("outputs")
     outputs = outputs_as_mapping(node) if node else MappingNode({}, tree.span)
     source = outputs.get(name)
     if not isinstance(source, ScalarNode):
         return PlaceMismatch(f"there is no output `{name}`", suggest_name(name, outputs.entries))
-    return _signal_place(tree, known, pattern, name, "y", source.text)
+    place = _signal_place(tree, known, pattern, name, "y", source.text)
+    if isinstance(place, PlaceMismatch):
+        return place
+    tables = [table for section in ("states", "inputs") if (table := tree.get(section))]
+    is_known = any(isinstance(one, MappingNode) and source.text in one.entries for one in tables)
+    start = source.text if is_known else "0"
+    return dataclasses.replace(place, holes={**place.holes, "start": start})
 
 
 def _signal_place(

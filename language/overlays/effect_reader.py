@@ -68,7 +68,7 @@ HOLES_BY_PLACE_KIND = {
         *PATH_HOLES,
     ),
     "input": ("u", "unit", "unit_rate", *PATH_HOLES),
-    "output": ("y", "unit", "unit_rate", *PATH_HOLES),
+    "output": ("y", "start", "unit", "unit_rate", *PATH_HOLES),
     "element": (
         *("path", "order", "unit", "force", "angle", "far", "stretch", "gap_rate", *ELEMENT_PARTS),
         *(f"{part}_unit" for part in ELEMENT_PARTS),

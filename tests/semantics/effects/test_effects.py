@@ -288,3 +288,12 @@ def test_a_gap_of_no_width_is_none(tmp_path: Path) -> None:
     )
     plain = run_with_effects(tmp_path, "shaft", "{}", given, horizon="1.4 s")
     assert np.max(np.abs(torque(found) - torque(plain))) < EXACT
+
+
+def test_the_lag_of_a_signal_that_is_an_equation_starts_at_zero(tmp_path: Path) -> None:
+    """The torque is 400 * 0.1 t + 20 * 0.1; it has no value before the states have one."""
+    effects = "{sensor_lag@T_s: {values: {tau: 100 ms}}}"
+    found = run_with_effects(tmp_path, "shaft", effects, {"v": "0.1 rad/s"})
+    t, tau = found.times, 0.1
+    wanted = 40 * (t - tau) + 2 + (40 * tau - 2) * np.exp(-t / tau)
+    assert np.max(np.abs(torque(found) - wanted)) < 1e-7
