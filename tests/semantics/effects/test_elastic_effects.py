@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import modewright as mw
+from language.loading.load import load_automaton
+from language.overlays.expand_document import Project
 from tests.semantics.effects.step_response import run_with_effects
 
 EXACT = 1e-9
@@ -221,3 +223,29 @@ def test_a_second_gap_with_a_body_in_between_gives_way_by_all_of_its_parts(tmp_p
     assert last["T_2_half_shaft"] == pytest.approx(last["T_hs"], rel=5e-3)
     assert last["x_2_half_shaft"] == pytest.approx(0.03 + last["T_2_half_shaft"] / 20e3, rel=1e-3)
     assert last["theta_d"] > last["theta_b"] + last["x_2_half_shaft"] > 0.03
+
+
+MEASURED_TWIST = """\
+language: 1
+automaton: strut
+about: a spring, damper and gap between two recorded ends
+parameters: {k: {value: 400 N*m/rad}, c: {value: 20 N*m*s/rad}}
+inputs: {v: {unit: rad/s}}
+states: {x: {unit: rad, initial: 0 rad}, g: {unit: rad, initial: 0 rad}}
+equations: {T_s: k * (x - g) + c * v}
+flow: {x: der(x) = v, g: der(g) = 0 * v}
+elements:
+  spring: {kind: elastic, twist: x, rate: v, torque: T_s, stiffness: k, damping: c, gap: g}
+outputs: {x: x, T_s: T_s}
+effects: {EFFECT@spring: {}}
+"""
+
+
+@pytest.mark.parametrize(
+    "effect", ["backlash", "mount_compliance", "second_gap", "stiffness_hysteresis"]
+)
+def test_a_measured_twist_is_that_of_the_whole_element(tmp_path: Path, effect: str) -> None:
+    path = tmp_path / "strut.yaml"
+    path.write_text(MEASURED_TWIST.replace("EFFECT", effect), "utf-8")
+    automaton = load_automaton(str(path), Project(tmp_path))
+    assert automaton.output_source("x") == "x"
