@@ -185,6 +185,9 @@ def _find_element(
             dimension = known.type_of_formula(node)
             if isinstance(dimension, Dimension):
                 kinds[part] = dimension
+    if "angle_rate" in pattern.has and holes.get("angle_rate") == holes.get("rate"):
+        label = f"the `angle_rate` of element `{name}` is the rate of its own twist"
+        return PlaceMismatch(label, "name the speed whose integral is the position of the element")
     if "far" in element.entries or pattern.of == "inertia":
         holes["far"] = tuple(item.text for item in scalars_of(element.get("far")))
     measured = "torque" if pattern.of == "elastic" else "inertia"

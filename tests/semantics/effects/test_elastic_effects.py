@@ -10,6 +10,7 @@ import pytest
 import modewright as mw
 from language.loading.load import load_automaton
 from language.overlays.expand_document import Project
+from language.text.diagnostic import SpecError
 from tests.semantics.effects.step_response import run_with_effects
 
 EXACT = 1e-9
@@ -249,3 +250,13 @@ def test_a_measured_twist_is_that_of_the_whole_element(tmp_path: Path, effect: s
     path.write_text(MEASURED_TWIST.replace("EFFECT", effect), "utf-8")
     automaton = load_automaton(str(path), Project(tmp_path))
     assert automaton.output_source("x") == "x"
+
+
+def test_the_twist_of_an_element_is_no_position_of_a_turn(tmp_path: Path) -> None:
+    path = tmp_path / "strut.yaml"
+    text = MEASURED_TWIST.replace("EFFECT", "position_dependent_stiffness")
+    path.write_text(text.replace("gap: g}", "gap: g, angle_rate: v}"), "utf-8")
+    with pytest.raises(SpecError) as caught:
+        load_automaton(str(path), Project(tmp_path))
+    (problem,) = caught.value.problems
+    assert "the `angle_rate` of element `spring` is the rate of its own twist" in problem.label
