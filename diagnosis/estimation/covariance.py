@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -18,18 +19,22 @@ WINDOW = 5.0
 def quantities_of(model: Estimate) -> dict[str, Quantity]:
     """Return the value [SI] and standard deviation of each free parameter, by name.
 
-    A parameter per recording has the mean of its values, and the standard deviation of an average
-    recording with the shared parameters fixed. That of a logarithmic coordinate is scaled to the
-    value. The model must have normal equations.
+    The standard deviation of a shared parameter is that of `marginal_covariance`. A parameter per
+    recording has the mean of its values, and the standard deviation of an average recording with
+    the shared parameters fixed. The model must have normal equations and a Jacobian.
     """
-    spread = _coordinate_stds(model)
-    recordings = len(model.point.per_recording)
-    each = [model.values(k) for k in range(recordings)]
+    assert model.normal_equations is not None
+    covariance, names = marginal_covariance(model)
+    stds = dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+    each = [model.values(k) for k in range(len(model.point.per_recording))]
     quantities = {}
     for k, one in enumerate(model.candidate.free_parameters):
         value = float(np.mean([values[one.name] for values in each]))
-        slope = one.prior_std * (value if one.is_log else 1.0)
-        quantities[one.name] = Quantity(value, one.unit, abs(slope) * float(spread[k]))
+        if one.name not in stds:
+            information = float(np.mean(model.normal_equations.a[:, k, k]))
+            slope = one.prior_std * (value if one.is_log else 1.0)
+            stds[one.name] = abs(slope) / math.sqrt(1.0 + information)
+        quantities[one.name] = Quantity(value, one.unit, stds[one.name])
     return quantities
 
 
@@ -44,19 +49,6 @@ def correlations_of(covariance: Reals, names: Sequence[str]) -> Mapping[tuple[st
         for j in range(i):
             correlations[names[j], first] = float(covariance[i, j] / (sizes[i] * sizes[j]))
     return dict(sorted(correlations.items(), key=lambda item: -abs(item[1])))
-
-
-def covariance_of(model: Estimate) -> tuple[Reals, list[str]]:
-    """Return the posterior covariance (n, n) of the shared coordinates, and their names.
-
-    It is the inverse of J'WJ + I, where I comes from the standard normal priors. Coordinates per
-    recording are left out, as if they were fixed. The model must have normal equations.
-    """
-    assert model.normal_equations is not None
-    free = ~model.normal_equations.own
-    whole = np.sum(model.normal_equations.a, axis=0)[np.ix_(free, free)] + np.eye(int(free.sum()))
-    names = [name for name, one in zip(model.candidate.names, free, strict=True) if one]
-    return solve(whole, np.eye(len(whole))), names
 
 
 def marginal_covariance(model: Estimate) -> tuple[Reals, list[str]]:
@@ -126,18 +118,3 @@ def _scores(model: Estimate) -> Reals:
     for k, name in enumerate(names):
         scores[:, k] = -np.sum(np.nan_to_num(model.jacobian[name]) * weighted, axis=1)
     return scores
-
-
-def _coordinate_stds(model: Estimate) -> Reals:
-    """Return the standard deviations of all coordinates (parameters,).
-
-    A coordinate per recording has the one of an average recording, with shared parameters fixed.
-    """
-    assert model.normal_equations is not None
-    covariance, _ = covariance_of(model)
-    own = model.normal_equations.own
-    stds = np.zeros(len(own))
-    stds[~own] = np.sqrt(np.diag(covariance))
-    for k in np.flatnonzero(own):
-        stds[k] = 1.0 / np.sqrt(1.0 + float(np.mean(model.normal_equations.a[:, k, k])))
-    return stds
