@@ -23,8 +23,8 @@ USUAL_FORM_ERROR: float = FORM_ERROR**0.9 * LEAST_FORM_ERROR ** (1 - 0.9)
 """Error of the form that 9 of 10 effects do not exceed (0.28)."""
 FORM_SAMPLES = 8.0
 """Number of independent errors of the form of an effect (its degrees of freedom)."""
-NEGLIGIBLE_ENERGY = 0.02
-"""Energy of the remainder per channel below which no effect is sought: 2 % of the variance that
+NEGLIGIBLE_ENERGY = 0.03
+"""Energy of the remainder per channel below which no effect is sought: 3 % of the variance that
 nothing explains."""
 MAX_ORDINARY_ENERGY = 1.0
 """Energy of the remainder per channel up to which it may be an ordinary disturbance."""

@@ -30,6 +30,7 @@ from diagnosis.result.verdict import DecisionOutcome, verdict_id
 from diagnosis.selection.candidate_search import CandidateFit
 from diagnosis.selection.comparison import effective_gain
 from diagnosis.selection.forward_selection import (
+    MIN_RIVAL_RATIO,
     Selection,
     candidate_probabilities,
     select_effects,
@@ -40,8 +41,6 @@ from diagnosis.unknown_input.detection import detect_unknown_input
 
 MIN_SIMULATED_SHARE = 0.5
 """Part of the error of whole simulations that an effect explains at least."""
-MIN_RIVAL_RATIO = 0.5
-"""Probability of a rival of another name, relative to the accepted effect, that is ambiguous."""
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,8 @@ MAX_EFFECTS = 3
 """Largest number of accepted effects."""
 SET_PROBABILITY = 0.95
 """Probability of the set of an effect and its rivals."""
+MIN_RIVAL_RATIO = 0.5
+"""Probability, relative to that of another effect, from which an effect may be the right one."""
 
 
 @dataclass(frozen=True)
@@ -189,13 +191,12 @@ def _best_candidate(
     thresholds: Thresholds,
     preferred: Collection[str] = (),
 ) -> CandidateFit | None:
-    """Return the candidate with the largest gain, None if it does not gain its threshold.
+    """Return the candidate that is the best explanation, None if none gains its threshold.
 
-    There is none either if what the base leaves is negligible.
-
-    Of the candidates that explain enough, it is the first one that also explains enough of what is
-    wrong in free simulations, one in `preferred` before others. Beside accepted effects there must
-    be such a candidate.
+    There is none either if what the base leaves is negligible. The candidate explains enough, and
+    enough of what is wrong in free simulations; beside accepted effects there must be such a
+    candidate. Those in `preferred` go before others. Of several it is the one of `_most_probable`;
+    if none explains enough, it is the one with the largest gain.
     """
     if compared.is_negligible:
         return None
@@ -206,9 +207,25 @@ def _best_candidate(
     if not explaining:
         return next(iter(enough), None)
     simulating = _explain_simulations(model_set, compared, explaining)
-    simulating.sort(key=lambda one: one.placed_effect.id not in preferred)
+    allowed = [one for one in simulating if one.placed_effect.id in preferred] or simulating
     is_first = not compared.base.candidate.placed_effects
-    return next(iter(simulating), explaining[0] if is_first else None)
+    if allowed or is_first:
+        return _most_probable(compared, allowed or explaining)
+    return None
+
+
+def _most_probable(compared: Round, candidates: Sequence[CandidateFit]) -> CandidateFit:
+    """Return the candidate of largest gain of those that are at least `MIN_RIVAL_RATIO` (0.5) times
+    as probable as the most probable one.
+
+    A gain may come from parameters that describe the noise, so it decides only between candidates
+    of about the same probability.
+    """
+    probabilities = candidate_probabilities(compared)
+    known = [probabilities[one.placed_effect.id] for one in candidates]
+    least = MIN_RIVAL_RATIO * max(known)
+    pairs = zip(candidates, known, strict=True)
+    return max((one for one, value in pairs if value >= least), key=lambda one: one.gain)
 
 
 def _explain_simulations(

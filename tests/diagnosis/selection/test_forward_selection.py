@@ -212,13 +212,14 @@ def test_at_most_so_many_effects_are_accepted(
 @pytest.mark.parametrize(
     ("shares", "simulated", "taken"),
     [
-        ((0.8, 0.95), (1.0, 1.0), 0),  # the largest gain
+        ((0.95, 0.95), (1.0, 1.0), 0),  # the largest gain
+        ((0.8, 0.95), (1.0, 1.0), 1),  # the other one is more probable
         ((0.5, 0.95), (1.0,), 1),  # the first one explains too little
-        ((0.8, 0.95), (0.5, 0.9), 1),  # it does not simulate well
-        ((0.8, 0.95), (0.5, 0.6), 0),  # none does
+        ((0.95, 0.95), (0.5, 0.9), 1),  # it does not simulate well
+        ((0.95, 0.95), (0.5, 0.6), 0),  # none does
     ],
 )
-def test_the_first_candidate_that_explains_enough_is_taken(
+def test_the_best_candidate_that_explains_enough_is_taken(
     shares: tuple[float, float],
     simulated: tuple[float, ...],
     taken: int,
