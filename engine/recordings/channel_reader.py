@@ -31,7 +31,7 @@ from language.expressions.unit_spellings import UNIT_EQUIVALENTS, normalise_unit
 from language.expressions.units import SECOND, Unit, are_compatible
 from language.model.system import ColumnMapping, RecordingMap
 from language.text.diagnostic import Problems, Span, suggest_name
-from language.typecheck.types import MAX_INT, EnumType, IntType
+from language.typecheck.types import MAX_INT, EnumType
 
 MAX_STAMP_LENGTH = 40
 """Largest number of characters of a time stamp."""
@@ -286,7 +286,8 @@ class ChannelReader:
         values_si: list[float] = []
         scale = float(column.scale[0]) * column.sign
         means = cells[0] if len(cells) == 1 else _row_means(cells)
-        is_plain = not column.delay and column.signal_type is None
+        is_discrete = column.signal_type is not None and column.to is not None
+        is_plain = not column.delay and not is_discrete
         if stamps is self.clock and len(self.shared_times) == len(means) > 0 and is_plain:
             values = _scale_all(means, scale)
             if values is not None:
@@ -300,7 +301,7 @@ class ChannelReader:
                     self.problems.error("time", parts[0].place(k), label)
                 continue
             value = mean * scale
-            if column.signal_type is not None and math.isfinite(value):
+            if is_discrete and math.isfinite(value):
                 value = self._to_discrete(column, value, parts[0].place(k))
             if not math.isfinite(value):
                 place = parts[0].place(k)
@@ -359,7 +360,7 @@ class ChannelReader:
             return f"`{text}` in {self.file.noun} `{name}` is no truth value", "TRUE, FALSE, 1 or 0"
         if isinstance(kind, EnumType):
             label = f"`{text}` in {self.file.noun} `{name}` is no value of the enumeration"
-            return label, f"its values are {', '.join(kind.values)}"
+            return label, f"its values are {', '.join(filter(None, kind.values))}"
         help = ""
         if re.fullmatch(r"[+-]?\d{1,3}(,\d{3})+(\.\d*)?", text):
             help = "a number has no signs of thousands"
@@ -368,19 +369,21 @@ class ChannelReader:
         return f"`{text}` in {self.file.noun} `{name}` is not a finite number", help
 
     def _to_discrete(self, column: ColumnMapping, value: float, place: Span) -> float:
-        """Return a value of a truth value, whole number or enumeration as a whole number.
+        """Return a value of a bool, int or enum input as a whole number.
 
-        A value that is none is reported: it is not rounded to one.
+        A value that is none is reported: it is not rounded to one. A whole number outside the range
+        of its signal stays: the range of the input holds it, and a fault bit tells it.
         """
         kind = column.signal_type
         number = round(value)
-        if abs(value - number) > DISCRETE_TOLERANCE or abs(number) > MAX_INT:
-            label, help = f"`{column.name}` is {value:.9g}: no whole number", "its signal is whole"
-        elif kind == "truth" and number not in (0, 1):
-            label, help = f"`{column.name}` is {number}: no truth value", "TRUE, FALSE, 1 or 0"
-        elif isinstance(kind, EnumType) and not 0 <= number < len(kind.values):
-            label = f"`{column.name}` is {number}: no value of the enumeration"
-            help = "its numbers are " + ", ".join(f"{k} ({v})" for k, v in enumerate(kind.values))
+        is_whole = abs(value - number) <= DISCRETE_TOLERANCE and abs(number) <= MAX_INT
+        if kind == "truth" and not (is_whole and number in (0, 1)):
+            label, help = f"`{column.name}` is {value:.9g}: no truth value", "TRUE, FALSE, 1 or 0"
+        elif not is_whole:
+            label = f"`{column.name}` is {value:.9g}: no whole number"
+            help = "its signal is a whole number"
+            if isinstance(kind, EnumType):
+                help = "the names or the numbers of " + ", ".join(kind.values)
         else:
             return float(number)
         self.problems.error("value", place, label, help)

@@ -27,9 +27,11 @@ THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
 POINT_NUMBER = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d{1,3})?", re.ASCII)
 """Pattern of a number with a decimal point."""
 MISSING_WORDS = frozenset(
-    "nan -nan +nan #n/a #na n/a na - -- --- null none nil (null) 1.#qnan -1.#qnan 1.#ind -1.#ind "
-    "1.#snan #nan <na> missing".split()
-)  # fmt: skip
+    (
+        *("nan", "-nan", "+nan", "#nan", "1.#qnan", "-1.#qnan", "1.#snan", "1.#ind", "-1.#ind"),
+        *("#n/a", "#na", "n/a", "na", "<na>", "null", "(null)", "nil", "none", "-", "--", "---"),
+    )
+)
 """Texts in lower case that tools write for a value that is missing."""
 SEPARATOR_NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar"}
 """Separators in the order in which they are preferred, with their words."""
@@ -76,7 +78,7 @@ def detect_dialect(
 class _DialectSearch:
     """Search of the dialect of a text."""
 
-    def __init__(self, source: Source, stated: TextFormat, wanted: Collection[str]) -> None:
+    def __init__(self, source: Source, stated: TextFormat, wanted: frozenset[str]) -> None:
         self.source = source
         self.stated = stated
         self.wanted = wanted

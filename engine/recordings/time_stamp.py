@@ -16,7 +16,10 @@ StampKind = Literal["date", "day_of_year", "clock"]
 SECONDS_OF_DAY = 24 * 3600
 MIDNIGHT_STEP = Fraction(SECONDS_OF_DAY, 2)
 """Step back [s] of times of day from which the stamps have passed midnight."""
-TIME = r"(?P<hour>\d{1,2}):(?P<minute>\d\d):(?P<second>\d\d(?:[.,]\d*)?)(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?"
+TIME = (
+    r"(?P<hour>\d{1,2}):(?P<minute>\d\d):(?P<second>\d\d(?:[.,]\d*)?)"
+    r"(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?"
+)
 """Pattern of a time of day."""
 ZONE = r" ?(?P<zone>Z|UTC|GMT|[+-]\d\d:?\d\d|[+-]\d\d)?"
 """Pattern of a time zone."""
@@ -83,7 +86,9 @@ def calendar_format(texts: Sequence[str], stated: str = "") -> CalendarFormat | 
     if len(match["first"]) == 4:
         return CalendarFormat("date", "YMD", "the year is first")
     if stated in ("DMY", "MDY"):
-        return CalendarFormat("date", "DMY" if stated == "DMY" else "MDY", "`date_order` of the map")
+        return CalendarFormat(
+            "date", "DMY" if stated == "DMY" else "MDY", "`date_order` of the map"
+        )
     if len(match["last"]) != 4:
         raise StampError(
             f"the date `{first}` has no year of four digits", "write dates like 2026-01-31T10:30:00"

@@ -99,7 +99,11 @@ def add_signal_types(
 
 
 def type_columns(automaton: Automaton, mapping: RecordingMap) -> RecordingMap:
-    """Return a map whose columns know the types of the inputs and outputs of an automaton."""
+    """Return a map whose columns know the types of the inputs and outputs of an automaton.
+
+    The output `mode` is an enumeration of the modes at the positions of their numbers; numbers
+    without a mode have an empty name.
+    """
     inputs = {
         name: type_of_input(item.type, item.values) for name, item in automaton.inputs.items()
     }
@@ -108,6 +112,11 @@ def type_columns(automaton: Automaton, mapping: RecordingMap) -> RecordingMap:
         for name in automaton.outputs
         if (kind := automaton.name_types.get(automaton.output_source(name))) is not None
     }
+    modes = {mode.number: mode.name for mode in automaton.modes.values()}
+    names = tuple(modes.get(number, "") for number in range(max(modes, default=-1) + 1))
+    for name in automaton.outputs:
+        if automaton.output_source(name) == "mode":
+            outputs.setdefault(name, EnumType(names))
     return add_signal_types(mapping, inputs, outputs)
 
 

@@ -39,7 +39,10 @@ SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|"}
 """Separators of cells by their word in a map."""
 DECIMAL_SIGNS = {"point": ".", "comma": ","}
 """Decimal signs by their word in a map."""
-ENCODINGS = ("utf-8", "cp1252", "utf-16", "utf-16-le", "utf-16-be", "latin-1", "cp1250", "shift-jis")
+ENCODINGS = (
+    *("utf-8", "utf-16", "utf-16-le", "utf-16-be"),
+    *("cp1252", "cp1250", "latin-1", "shift-jis"),
+)
 """Encodings of text recordings that a map can state."""
 MAX_HEAD_LINE = 10_000
 """Largest number of the line with the names of columns."""

@@ -228,9 +228,7 @@ class TestAUnitOfTheFile:
             ("s,lbft,rad/s", 'unit: N*m, scale: 1.3558179483314, file_unit: "lbft"'),
         ],
     )
-    def test_is_never_ignored(
-        self, told_text: Callable[..., str], units: str, told: str
-    ) -> None:
+    def test_is_never_ignored(self, told_text: Callable[..., str], units: str, told: str) -> None:
         assert told in told_text(TABLE.replace("w\n", f"w\n{units}\n", 1))
 
     def test_in_brackets_of_a_name_is_compared_too(self, told_text: Callable[..., str]) -> None:
