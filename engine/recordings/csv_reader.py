@@ -51,8 +51,9 @@ def read_csv(path: Path, mapping: RecordingMap, problems: Problems) -> RecordedF
 
     The map may state the format (`csv`); what it does not state is detected (`detect_dialect`) and
     returned as assumptions. Blank lines, rows without a cell that is not blank, and comments are
-    skipped. Rows whose length differs from the head line are reported and left out; reading of rows
-    stops after `MAX_PROBLEMS` problems. Cells that are no decimal numbers are NaN; empty cells and
+    skipped, and so is a last line that is too short and has no end of line. Other rows whose length
+    differs from the head line are reported and left out; reading of rows stops after
+    `MAX_PROBLEMS` problems. Cells that are no decimal numbers are NaN; empty cells and
     words for a missing value are None. Raises SpecError if the file cannot be read or unpacked, is
     no text, is empty or larger than `MAX_BYTES`, or if its numbers have two meanings.
     """
@@ -64,7 +65,7 @@ def read_csv(path: Path, mapping: RecordingMap, problems: Problems) -> RecordedF
     for column in mapping.columns.values():
         wanted.update(column.columns, [column.time] if column.time else [])
     dialect = detect_dialect(source, mapping.text_format, wanted, notes)
-    rows = _CsvRows(source, dialect, problems)
+    rows = _CsvRows(source, dialect, problems, is_cut=not text.endswith(("\n", "\r")))
     return RecordedFile(
         source,
         "column",
@@ -146,8 +147,12 @@ def _has_control_characters(text: str) -> bool:
 class _CsvRows:
     """Cells of a text table with their places."""
 
-    def __init__(self, source: Source, dialect: Dialect, problems: Problems) -> None:
+    def __init__(
+        self, source: Source, dialect: Dialect, problems: Problems, is_cut: bool = False
+    ) -> None:
+        """Split the lines of a source; `is_cut` tells that the last line has no end."""
         self.source = source
+        self.is_cut = is_cut
         self.dialect = dialect
         self.separator = dialect.separator
         self.head = list(dialect.names)
@@ -229,7 +234,10 @@ class _CsvRows:
                 trailing += 1
             elif len(row) == width - 1 and not self.head[-1]:
                 row.append("")
-            if len(row) != width:
+            if self.is_cut and number == len(self.source.lines) and len(row) < width and self.rows:
+                value = f"line {number} left out"
+                self.notes.append(Assumption("last line", value, "it is cut off"))
+            elif len(row) != width:
                 label = f"this row has {len(row)} cells, the head line has {width}"
                 name = SEPARATOR_NAMES[self.separator]
                 hint = f"the cells of this file are divided by the {name}"

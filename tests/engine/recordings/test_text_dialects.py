@@ -79,6 +79,7 @@ DIALECTS = {
         "\n".join('"' + x.replace(";", '","') + '"' for x in COMMA.split()),
         {"decimal sign"},
     ),
+    "last line cut off": (TABLE + "0.03,4", {"last line"}),
     "minus of typography": (TABLE.replace("-", "\N{MINUS SIGN}"), set()),
     "exponents of Fortran": (TABLE.replace("1200.5", "1.2005D+03"), set()),
 }
