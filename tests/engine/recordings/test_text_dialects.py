@@ -258,3 +258,16 @@ def test_the_log_of_a_motor_controller_with_semicolons(read_text: ReadText) -> N
     recording = read_text(text, time="unit: ms")
     assert recording.channels["a"].times == (Fraction(36000), Fraction(3600005, 100))
     assert recording.channels["a"].values == (0.1, 3.5)
+
+
+def test_a_line_of_units_may_have_dashes_and_texts_for_columns_that_are_not_read(
+    read_text: ReadText,
+) -> None:
+    recording = read_text("t,a,w,x,y\ns,Nm,rad/s,--,furlong\n0,1,2,3,4\n1,2,3,4,5\n")
+    assert recording.channels["a"].values == (1.0, 2.0)
+
+
+def test_a_row_without_values_is_no_line_of_units(read_text: ReadText) -> None:
+    recording = read_text("t,a,w\n0,-,-\n1,2,3\n2,3,4\n")
+    assert recording.channels["a"].values == (2.0, 3.0)
+    assert recording.assumptions == ()
