@@ -43,6 +43,8 @@ FORTRAN_EXPONENT = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d)", re.ASCII)
 """Pattern of the letter of an exponent that Fortran writes."""
 NAME_WITH_UNIT = re.compile(r".*\S ?(?:\[([^\[\]]+)\]|\(([^()]+)\))")
 """Pattern of a name with its unit in brackets, such as `T [degC]`."""
+MAX_NOTED = 5
+"""Largest number of texts in brackets that are noted."""
 TEXT_HINT = "a recording is CSV, or CSV.gz"
 
 
@@ -167,13 +169,18 @@ class _CsvRows:
     def _units(self) -> list[str]:
         """Return the unit of each column: of the line of units, else in brackets in its name.
 
-        A text in brackets that is no unit belongs to the name.
+        A text in brackets that is no known unit belongs to the name, which is noted.
         """
         if self.dialect.units:
             return [*self.dialect.units, *[""] * len(self.head)][: len(self.head)]
         found = [NAME_WITH_UNIT.fullmatch(name) for name in self.head]
         texts = [(match[1] or match[2] or "").strip() if match else "" for match in found]
-        return [text if unit_meanings(text) and text != "1" else "" for text in texts]
+        unknown = [text for text in texts if text and not unit_meanings(text)]
+        if unknown:
+            value = ", ".join(f"`{text}`" for text in dict.fromkeys(unknown[:MAX_NOTED]))
+            reason = "no known unit: a part of the name"
+            self.notes.append(Assumption("brackets in names", value, reason))
+        return [text if unit_meanings(text) and not text.isdigit() else "" for text in texts]
 
     def explain_missing(self, name: str) -> str:
         """Return the name with its unit in brackets, or why the head line has one cell only."""

@@ -271,3 +271,9 @@ def test_a_row_without_values_is_no_line_of_units(read_text: ReadText) -> None:
     recording = read_text("t,a,w\n0,-,-\n1,2,3\n2,3,4\n")
     assert recording.channels["a"].values == (2.0, 3.0)
     assert recording.assumptions == ()
+
+
+def test_a_text_in_brackets_that_is_no_unit_is_told(read_text: ReadText) -> None:
+    recording = read_text("t,a,w,x (left)\n0,1,2,3\n1,2,3,4\n")
+    (item,) = recording.assumptions
+    assert (item.subject, item.value) == ("brackets in names", "`left`")
