@@ -94,7 +94,7 @@ def test_the_same_table_in_another_dialect(read_text: ReadText, name: str) -> No
     recording = read_text(data)
     assert recording.channels["a"].values == (1.5, -2.25, 3.0)
     assert recording.channels["w"].values == (10.0, 1200.5, 12.0)
-    assert recording.channels["a"].times == (0, Fraction(1, 100), Fraction(2, 100))
+    assert recording.channels["a"].times == (Fraction(0), Fraction(1, 100), Fraction(2, 100))
     assert {item.subject for item in recording.assumptions} == assumed
 
 
