@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from engine.recordings.channel_reader import ChannelReader, require_names
 from engine.recordings.csv_reader import read_csv
-from engine.recordings.recording_file import RecordedFile, require_regular_file
+from engine.recordings.recording_file import Assumption, RecordedFile, require_regular_file
 from engine.recordings.recording_window import strip_window_suffix, windows_in_use
 from language.model.system import ColumnMapping, RecordingMap, Window
 from language.overlays.expand_document import display_path
@@ -59,7 +59,8 @@ class Recording:
     """Channels that a map takes from a file, by their names in the map.
 
     `start` and `end` [s] are the first and last time. `windows` [s] are the times to use, in order;
-    empty means all. `place` is that of the file, for messages.
+    empty means all. `place` is that of the file, for messages. `assumptions` tell what was taken of
+    the file that neither the file nor the map states.
     """
 
     name: str
@@ -68,6 +69,7 @@ class Recording:
     start: Fraction = Fraction(0)
     windows: tuple[Window, ...] = ()
     place: Span | None = None
+    assumptions: tuple[Assumption, ...] = ()
 
     def is_used(self, time: Fraction) -> bool:
         """Return whether a time [s] lies in a window, ends included; True without windows."""
@@ -137,6 +139,8 @@ def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Re
     problems.raise_if_errors()
     place = Span(Source(display_path(strip_window_suffix(path))), 1, 1)
     recording = Recording(path.name, channels, max(known), min(known), windows, place)
+    assumed = tuple(dict.fromkeys((*file.assumptions, *reader.assumptions)))
+    recording = dataclasses.replace(recording, assumptions=assumed)
     return crop_to_windows(recording, mapping)
 
 
@@ -171,7 +175,7 @@ def open_recording(path: Path, mapping: RecordingMap, problems: Problems) -> Rec
         from engine.recordings.can_reader import read_can
 
         return read_can(path, mapping)
-    return read_csv(path, problems)
+    return read_csv(path, mapping, problems)
 
 
 def _is_mdf(path: Path) -> bool:

@@ -34,12 +34,25 @@ class Samples:
 
 
 @dataclass(frozen=True)
+class Assumption:
+    """What a reader has taken of a file that neither the file nor the map states.
+
+    `subject` is for example `separator`, `value` is `semicolon`, and `reason` the evidence.
+    """
+
+    subject: str
+    value: str
+    reason: str
+
+
+@dataclass(frozen=True)
 class RecordedFile:
     """File of measurements with named columns, channels or signals.
 
     `noun` is the word for these in messages. `read` returns the samples of a name. `is_stamped`
     tells whether each name has its own time stamps. `explain_missing` returns a hint for a missing
-    name, or an empty text.
+    name, or an empty text. `head_line` is the number of the line with the names. `assumptions` are
+    what the reader has taken.
     """
 
     source: Source
@@ -49,12 +62,15 @@ class RecordedFile:
     rows: int
     is_stamped: bool = False
     explain_missing: Callable[[str], str] = lambda name: ""
+    head_line: int = 1
+    assumptions: tuple[Assumption, ...] = ()
 
     @property
     def header_span(self) -> Span:
-        """Place of the names: the whole first line of the file; a binary file has one character."""
+        """Place of the names: the whole head line of the file; a binary file has one character."""
         lines = self.source.lines
-        return Span(self.source, 1, 1, max(1, len(lines[0])) if lines else 1)
+        length = len(lines[self.head_line - 1]) if lines else 1
+        return Span(self.source, self.head_line, 1, max(1, length))
 
 
 def require_size(path: Path, source: Source) -> None:
