@@ -78,6 +78,11 @@ def check_recordings(
         if (finding.recording, finding.channel) not in outlying
     ]
     findings += [*_find_insufficient_data(recordings, channels, excited), *file_findings]
+    findings += [
+        Finding("reading", one.name, note.channel, note.text, "note")
+        for one in recordings
+        for note in one.notes
+    ]
     reference = None
     if automaton is not None and automaton.period is None:
         reference = cached_reference(automaton, mapping, run_programs)

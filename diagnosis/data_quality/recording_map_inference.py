@@ -18,7 +18,7 @@ from diagnosis.data_quality.clock_overlap import (
     lacking_overlap,
 )
 from diagnosis.data_quality.finding import Finding, Severity
-from engine.recordings.channel_reader import file_unit
+from engine.recordings.channel_reader import UNSTATED, file_unit
 from engine.recordings.recording import open_recording
 from engine.recordings.recording_file import RecordedFile, Samples
 from language.expressions.units import NO_UNIT, PURE_NUMBER, Unit, are_compatible, parse_unit
@@ -84,7 +84,10 @@ def guess_map(
     findings = [
         finding
         for path, file in zip(paths, files, strict=True)
-        for finding in _left_out_findings(file, mapping, names[path])
+        for finding in (
+            *_left_out_findings(file, mapping, names[path]),
+            *_unknown_unit_findings(file, mapping, names[path]),
+        )
     ]
     return mapping, tuple(findings)
 
@@ -121,6 +124,17 @@ def _left_out_findings(file: RecordedFile, mapping: RecordingMap, name: str) -> 
         text += ": left out (--map says which columns are read)"
         found.append(Finding("left_out", name, column, text, severity))
     return found
+
+
+def _unknown_unit_findings(
+    file: RecordedFile, mapping: RecordingMap, name: str
+) -> Iterator[Finding]:
+    """Yield a note on each column of a guessed map whose unit in the file is unknown."""
+    for column in mapping.columns.values():
+        written = column.file_unit.strip()
+        if column.name in file.names and written not in UNSTATED and file_unit(written) is None:
+            text = f"has the unknown unit '{written[:MAX_SHOWN]}': read as {column.unit.text}"
+            yield Finding("reading", name, column.name, text, "note")
 
 
 def _explain_no_number(samples: Samples) -> tuple[str, Severity]:
@@ -211,6 +225,7 @@ def _guess_column(name: str, written: str, span: Span) -> ColumnMapping:
         blank="skip",
         time=None,
         span=span,
+        file_unit=written,
     )
 
 

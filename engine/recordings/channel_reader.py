@@ -16,7 +16,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from engine.recordings.csv_reader import DECIMAL
-from engine.recordings.recording_file import MAX_PROBLEMS, RecordedFile, Samples
+from engine.recordings.recording_file import MAX_PROBLEMS, Note, RecordedFile, Samples
 from language.expressions.units import Unit, UnitError, are_compatible, parse_unit
 from language.model.system import ColumnMapping, RecordingMap
 from language.text.diagnostic import Problems, Span, suggest_name
@@ -41,6 +41,9 @@ LOGGER_UNITS = {
 }  # fmt: skip
 """Units as loggers and DBC files write them."""
 
+UNSTATED = ("", "-", "--")
+"""Texts of a file that states no unit."""
+
 
 def require_names(
     file: RecordedFile, names: Sequence[str], mapping: RecordingMap, problems: Problems
@@ -57,7 +60,8 @@ def require_names(
             hint = file.explain_missing(name) or suggest_name(name, file.names)
             problems.error("column", file.header_span, label, hint)
         elif count > 1:
-            problems.error("column", file.header_span, f"there are two {file.noun}s `{name}`")
+            label = f"there are {'two' if count == 2 else count} {file.noun}s `{name}`"
+            problems.error("column", file.header_span, label, file.explain_ambiguous(name))
     if not file.rows:
         label = "the recording has a head line and no values"
         if file.is_stamped:
@@ -76,6 +80,7 @@ class ChannelReader:
         self.file = file
         self.mapping = mapping
         self.problems = problems
+        self.notes: list[Note] = []
         self.clock = [] if file.is_stamped else self.times(mapping.time)
 
     @cached_property
@@ -128,7 +133,7 @@ class ChannelReader:
 
     def _report_unsorted(self, text: str, last: Fraction, place: Span) -> None:
         """Report a time stamp that is not above the previous one."""
-        label = f"the time stamp {text} is not above the one before, {float(last):.9g}"
+        label = f"the time stamp {text} is not above the one before, {float(last)!r}"
         hint = "sort the recording, and remove repeated rows"
         self.problems.error("time", place, label, hint)
 
@@ -146,7 +151,7 @@ class ChannelReader:
             self.problems.error("time", column.span, label, hint)
         for k, (before, after) in enumerate(itertools.pairwise(stamps), start=1):
             if after <= before and not self.has_max_problems:
-                self._report_unsorted(f"{float(after):.9g}", before, parts[0].place(k))
+                self._report_unsorted(repr(float(after)), before, parts[0].place(k))
         return stamps
 
     def samples(self, column: ColumnMapping) -> tuple[tuple[Fraction, ...], tuple[float, ...]]:
@@ -160,6 +165,7 @@ class ChannelReader:
         the map refuses them, another unit in the file, and a column without values.
         """
         parts = [self.file.read(name) for name in column.columns]
+        self.notes += [Note(column.name, text) for part in parts for text in part.notes]
         if self.file.is_stamped:
             stamps = self._own_stamps(column, parts)
         else:
@@ -221,15 +227,25 @@ class ChannelReader:
         return result
 
     def _check_unit(self, name: str, written: str, column: ColumnMapping) -> None:
-        """Report a known unit of the file that differs from the unit of the map."""
+        """Report a unit of the file that is unknown or differs from the unit of the map.
+
+        Units in `UNSTATED` and the unit that the map accepts (`file_unit`) are not reported.
+        """
+        written = written.strip()
+        if written in (*UNSTATED, column.file_unit.strip()):
+            return
         unit = file_unit(written)
+        accept = f"`file_unit: '{written}'` in the map takes it as `{column.unit.text}`"
         if unit is None:
+            label = f"the file gives `{name}` in `{written}`, which is no known unit"
+            self.problems.error("unit", column.span, label, accept)
             return
         text = unit.text
         same = are_compatible(unit.dimension, column.unit.dimension)
         if not same or (unit.factor, unit.offset) != (column.unit.factor, column.unit.offset):
             label = f"the file gives `{name}` in `{text}`, the map in `{column.unit.text}`"
-            self.problems.error("unit", column.span, label, f"`unit: {text}` in the map")
+            hint = f"`unit: {text}` in the map; {accept}"
+            self.problems.error("unit", column.span, label, hint)
 
 
 def file_unit(written: str) -> Unit | None:

@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 
 from engine.recordings.channel_reader import ChannelReader, require_names
 from engine.recordings.csv_reader import read_csv
-from engine.recordings.recording_file import RecordedFile, require_regular_file
+from engine.recordings.recording_file import Note, RecordedFile, require_regular_file
 from engine.recordings.recording_window import strip_window_suffix, windows_in_use
 from language.model.system import ColumnMapping, RecordingMap, Window
 from language.overlays.expand_document import display_path
 from language.text.diagnostic import Problems, Source, Span
+from language.text.sanitise import escape_invisible
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,8 @@ class Recording:
     """Channels that a map takes from a file, by their names in the map.
 
     `start` and `end` [s] are the first and last time. `windows` [s] are the times to use, in order;
-    empty means all. `place` is that of the file, for messages.
+    empty means all. `place` is that of the file, for messages. `notes` tell what the reader left out
+    or assumed.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Recording:
     start: Fraction = Fraction(0)
     windows: tuple[Window, ...] = ()
     place: Span | None = None
+    notes: tuple[Note, ...] = ()
 
     def is_used(self, time: Fraction) -> bool:
         """Return whether a time [s] lies in a window, ends included; True without windows."""
@@ -136,7 +139,9 @@ def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Re
     windows = windows_in_use(path, mapping, problems)
     problems.raise_if_errors()
     place = Span(Source(display_path(strip_window_suffix(path))), 1, 1)
-    recording = Recording(path.name, channels, max(known), min(known), windows, place)
+    notes = [*(Note("", text) for text in file.notes), *dict.fromkeys(reader.notes)]
+    notes = [dataclasses.replace(note, text=escape_invisible(note.text)) for note in notes]
+    recording = Recording(path.name, channels, max(known), min(known), windows, place, tuple(notes))
     return crop_to_windows(recording, mapping)
 
 
@@ -151,8 +156,8 @@ def _share_seconds(channels: Iterable[Channel]) -> None:
 def open_recording(path: Path, mapping: RecordingMap, problems: Problems) -> RecordedFile:
     """Open a file by its suffix in any case; a time window at the end of the path is ignored.
 
-    `.parquet` is Parquet; `.mf4`, `.mdf`, and `.dat` that starts with `MDF` are MDF; `.blf`, `.asc`
-    and `.log` are CAN logs; all others CSV, whose faulty rows are added to `problems`. Raises
+    `.parquet` is Parquet; `.mf4`, `.mdf`, and `.dat` that starts with `MDF` are MDF; `.blf`,
+    `.asc`, `.trc` and `.log` are CAN logs; all others CSV, whose faulty rows are added to `problems`. Raises
     SpecError for a pipe, a device and a file that cannot be read, and MissingToolError if a library
     is not installed.
     """
@@ -166,8 +171,8 @@ def open_recording(path: Path, mapping: RecordingMap, problems: Problems) -> Rec
     if ending in (".mf4", ".mdf") or (ending == ".dat" and _is_mdf(path)):
         from engine.recordings.mdf_reader import read_mdf
 
-        return read_mdf(path)
-    if ending in (".blf", ".asc", ".log"):
+        return read_mdf(path, mapping)
+    if ending in (".blf", ".asc", ".trc", ".log"):
         from engine.recordings.can_reader import read_can
 
         return read_can(path, mapping)

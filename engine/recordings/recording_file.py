@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import stat
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -15,6 +16,21 @@ MAX_BYTES = 512 * 1024 * 1024
 MAX_PROBLEMS = 20
 """Number of reported problems after which values are not checked further."""
 
+NO_VALUE = re.compile(
+    r"sna|signal[ _]?not[ _]?available|not[ _]?available|not[ _]?valid|invalid|n/?a|error|"
+    r"undefined|no[ _]?value|no[ _]?data",
+    re.IGNORECASE,
+)
+"""Words for a missing value in the value tables of DBC and MF4 files."""
+
+
+@dataclass(frozen=True)
+class Note:
+    """What a reader left out or assumed; `channel` is its name in the map, empty for the file."""
+
+    channel: str
+    text: str
+
 
 @dataclass(frozen=True)
 class Samples:
@@ -23,7 +39,7 @@ class Samples:
     `values` are None for an empty cell, and not finite if `text` is no finite number. `text` and
     `place` give the text and the place of a sample by index; in a binary format the row or sample
     number stands for the line. `stamps` [s] are the time stamps of the samples; None if the rows
-    share a time column. `unit` is the unit text of the file.
+    share a time column. `unit` is the unit text of the file. `notes` tell what is left out.
     """
 
     values: Sequence[float | None]
@@ -31,6 +47,7 @@ class Samples:
     place: Callable[[int], Span]
     stamps: Sequence[Fraction] | None = None
     unit: str = ""
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -39,7 +56,8 @@ class RecordedFile:
 
     `noun` is the word for these in messages. `read` returns the samples of a name. `is_stamped`
     tells whether each name has its own time stamps. `explain_missing` returns a hint for a missing
-    name, or an empty text.
+    name, `explain_ambiguous` one for a name that occurs several times, or an empty text. `notes`
+    tell what the reader left out or assumed in the whole file.
     """
 
     source: Source
@@ -49,6 +67,8 @@ class RecordedFile:
     rows: int
     is_stamped: bool = False
     explain_missing: Callable[[str], str] = lambda name: ""
+    explain_ambiguous: Callable[[str], str] = lambda name: ""
+    notes: tuple[str, ...] = ()
 
     @property
     def header_span(self) -> Span:
@@ -104,3 +124,9 @@ def exact_fraction(value: float) -> Fraction:
     Raises ValueError if the number is not finite.
     """
     return Fraction(repr(float(value)))
+
+
+def first_line(error: Exception) -> str:
+    """Return the first line of an error message, or the name of the error."""
+    text = str(error).strip().splitlines()
+    return text[0].rstrip(".") if text else type(error).__name__

@@ -31,7 +31,7 @@ from language.text.document import (
 
 MAP_KEYS = ("language", "map", "time", "columns", "constants", "windows", "dbc")
 COLUMN_KEYS = (
-    "column mean to compare unit scale sign delay hold blank time".split()  # noqa: SIM905
+    "column mean to compare unit file_unit scale sign delay hold blank time".split()  # noqa: SIM905
 )
 
 
@@ -184,6 +184,9 @@ class _MapReader(Reader):
             time=self.read_string(time, "time", entry.span) if time else None,
             span=entry.span,
             hold=cast(Literal["previous", "linear"], hold) if hold else None,
+            file_unit=self.read_string(table.get("file_unit"), "file_unit", entry.span)
+            if "file_unit" in table.entries
+            else "",
         )
 
     def _read_scale(self, table: MappingNode) -> tuple[Fraction, Dimension]:

@@ -216,6 +216,7 @@ class ColumnMapping:
     Of several `columns` the mean is used. The signal is the input `to`, or it is compared with the
     output `compare`. `delay` is in s. `time` names a time column of its own. Without `hold` a value
     is kept until the next one; a diagnosis may then choose (`diagnosis.selection.intersample`).
+    `unit` holds although the file states `file_unit`.
     """
 
     name: str
@@ -230,6 +231,7 @@ class ColumnMapping:
     time: str | None
     span: Span
     hold: Literal["previous", "linear"] | None = None
+    file_unit: str = ""
 
 
 Window = tuple[Fraction, Fraction]
