@@ -21,8 +21,8 @@ from language.text.project_boundary import path_exists, project_root_of, require
 
 DATABASE_SUFFIXES = (".dbc", ".arxml", ".kcd", ".sym")
 """Suffixes of files that describe CAN messages; the first is suggested."""
-MAX_LEFT_OUT = 20
-"""Largest number of statements of a DBC file that are left out."""
+MAX_ROUNDS = 20
+"""Largest number of times that a DBC file is read again without statements that are refused."""
 UNUSED = re.compile(r"^\s*(VAL_|SIG_VALTYPE_)\s+(\d+)\s+(\w+)", re.MULTILINE)
 """Entries for signals that do not exist, as cantools lists them."""
 SYNTAX_LINE = re.compile(r"[Ii]nvalid syntax at line (\d+)")
@@ -54,7 +54,8 @@ class CanSignal:
         else:
             first = start
         needed = (first + self.signal.length + 7) // 8
-        return max(self.message.length, needed, self.selector.length if self.selector else 0)
+        own = max(int(self.message.length), needed)
+        return max(own, self.selector.length) if self.selector else own
 
     @cached_property
     def _codec(self) -> Any:
@@ -156,7 +157,7 @@ def is_j1939(message: Any) -> bool:
     """
     if not message.is_extended_frame:
         return False
-    return message.protocol == "j1939" or message.frame_id & 0xFF == J1939_NULL_ADDRESS
+    return bool(message.protocol == "j1939" or message.frame_id & 0xFF == J1939_NULL_ADDRESS)
 
 
 def read_databases(mapping: RecordingMap, cantools: Any) -> tuple[list[Any], list[str]]:
@@ -213,35 +214,44 @@ def _read_database(
         label = f"`{written.text}` cannot be read: {error.strerror or error}"
         problems.error("unreadable", written.span, label)
         return []
-    kind = path.suffix.lower().lstrip(".")
-    lines = _decode(data).splitlines() if kind in ("dbc", "sym") else []
-    left_out: list[str] = []
-    while True:
-        try:
-            if lines or not data:
-                database = cantools.database.load_string(
-                    "\n".join(lines) + "\n", kind, strict=False
-                )
-            else:
-                database = cantools.database.load_file(path, strict=False)
-            break
-        except Exception as error:  # the library raises errors of any type for a broken file
-            text = str(error)
-            removed = _blank_statements(lines, text) if kind == "dbc" else []
-            if not removed or len(left_out) > MAX_LEFT_OUT:
-                reason = " ".join(text.removeprefix("DBC: ").strip('"').split())
-                label = f"`{written.text}` cannot be understood: {reason or first_line(error)}"
-                problems.error("unreadable", written.span, label)
-                return []
-            left_out += removed
+    try:
+        messages, left_out = _load_messages(path, data, cantools)
+    except Exception as error:  # the library raises errors of any type for a broken file
+        text = str(error).removeprefix("DBC: ").strip('"')
+        reason = " ".join(text.split()) or first_line(error)
+        label = f"`{written.text}` cannot be understood: {reason}"
+        problems.error("unreadable", written.span, label)
+        return []
     if left_out:
         rest = f", and {len(left_out) - 1} more" if len(left_out) > 1 else ""
         notes.append(f"`{written.text}`: {left_out[0]}{rest} cannot be understood: left out")
-    messages: Sequence[Any] = database.messages
     if left_out and not messages:
         label = f"`{written.text}` cannot be understood: {left_out[0]} is no statement of a DBC"
         problems.error("unreadable", written.span, label)
     return messages
+
+
+def _load_messages(path: Path, data: bytes, cantools: Any) -> tuple[Sequence[Any], list[str]]:
+    """Return the messages of a database, and texts for the statements that are left out.
+
+    Statements of a DBC file that cantools refuses are left out in `MAX_ROUNDS` rounds at most.
+    Raises the error of cantools that remains.
+    """
+    if path.suffix.lower() != ".dbc":
+        return cantools.database.load_file(path, strict=False).messages, []
+    lines = _decode(data).splitlines()
+    left_out: list[str] = []
+    for _ in range(MAX_ROUNDS):
+        try:
+            text = "\n".join(lines) + "\n"
+            return cantools.database.load_string(text, "dbc", strict=False).messages, left_out
+        except cantools.database.UnsupportedDatabaseFormatError as error:
+            removed = _blank_statements(lines, str(error))
+            if not removed:
+                raise
+            left_out += removed
+    text = "\n".join(lines) + "\n"
+    return cantools.database.load_string(text, "dbc", strict=False).messages, left_out
 
 
 def _decode(data: bytes) -> str:

@@ -6,7 +6,6 @@ parse. Lines that are no complete frames are left out and noted.
 
 from __future__ import annotations
 
-import io
 import logging
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -162,15 +161,17 @@ def _read_text(path: Path, source: Source, can: Any, notes: list[str]) -> list[t
     lines = list(enumerate(text.splitlines(), start=1))
     bad: list[_BadLine] = []
     suffix = path.suffix.lower()
-    if suffix == ".log":
-        reader, checked, is_header = can.CanutilsLogReader, _check_candump(lines, bad), _is_never
-    else:
+    is_header: Callable[[str], bool] = _is_trc_header
+    if suffix != ".log":
         _drop_cut_line(text, lines, bad)
-        if suffix == ".asc":
-            checked = _check_asc(lines, notes)
-            reader, is_header = can.ASCReader, _is_asc_header
-        else:
-            reader, checked, is_header = can.TRCReader, lines, _is_trc_header
+    if suffix == ".log":  # it has no header
+        reader, is_header = can.CanutilsLogReader, lambda _: False
+        checked = _check_candump(lines, bad)
+    elif suffix == ".asc":
+        reader, is_header = can.ASCReader, _is_asc_header
+        checked = _check_asc(lines, notes)
+    else:
+        reader, checked = can.TRCReader, lines
     frames = list(_parse_lines(reader, checked, is_header, bad))
     bad.sort()
     if len(bad) > len(frames) or not frames:
@@ -244,11 +245,6 @@ def _check_asc(lines: Sequence[tuple[int, str]], notes: list[str]) -> list[tuple
     return result
 
 
-def _is_never(line: str) -> bool:
-    """Return False: a candump log has no header."""
-    return False
-
-
 def _is_asc_header(line: str) -> bool:
     """Return whether a line of an ASC log belongs to its header: it states date, base or events."""
     return bool(
@@ -261,17 +257,24 @@ def _is_trc_header(line: str) -> bool:
     return line.lstrip().startswith(";")
 
 
-class _LineFeed(io.TextIOBase):
+class _LineFeed:
     """Text file of numbered lines; `number` is that of the line that was read last."""
 
     def __init__(self, lines: Iterable[tuple[int, str]]) -> None:
         self.lines = iter(lines)
         self.number = 0
 
+    def __iter__(self) -> Iterator[str]:
+        """Return the feed itself: reading continues at the next line."""
+        return self
+
     def __next__(self) -> str:
         """Return the next line."""
         self.number, line = next(self.lines)
         return line + "\n"
+
+    def close(self) -> None:
+        """Do nothing: the lines are in memory."""
 
 
 def _parse_lines(

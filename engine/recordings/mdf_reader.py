@@ -180,7 +180,7 @@ class _MdfFile:
         """
         if CAN_FRAMES not in self.places or not self.mapping.databases:
             return file
-        can, cantools = import_can("an MF4 file with frames of a CAN bus")
+        _, cantools = import_can("an MF4 file with frames of a CAN bus")
         messages, notes = read_databases(self.mapping, cantools)
         bus = decode_can(self.source, messages, self._read_frames(), tuple(notes))
         signals = set(bus.names)

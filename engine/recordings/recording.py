@@ -60,8 +60,8 @@ class Recording:
     """Channels that a map takes from a file, by their names in the map.
 
     `start` and `end` [s] are the first and last time. `windows` [s] are the times to use, in order;
-    empty means all. `place` is that of the file, for messages. `notes` tell what the reader left out
-    or assumed.
+    empty means all. `place` is that of the file, for messages. `notes` tell what the reader left
+    out or assumed.
     """
 
     name: str
@@ -157,9 +157,9 @@ def open_recording(path: Path, mapping: RecordingMap, problems: Problems) -> Rec
     """Open a file by its suffix in any case; a time window at the end of the path is ignored.
 
     `.parquet` is Parquet; `.mf4`, `.mdf`, and `.dat` that starts with `MDF` are MDF; `.blf`,
-    `.asc`, `.trc` and `.log` are CAN logs; all others CSV, whose faulty rows are added to `problems`. Raises
-    SpecError for a pipe, a device and a file that cannot be read, and MissingToolError if a library
-    is not installed.
+    `.asc`, `.trc` and `.log` are CAN logs; all others CSV, whose faulty rows are added to
+    `problems`. Raises SpecError for a pipe, a device and a file that cannot be read, and
+    MissingToolError if a library is not installed.
     """
     path = strip_window_suffix(path)
     require_regular_file(path, Source(display_path(path)))

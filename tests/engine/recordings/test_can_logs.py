@@ -18,7 +18,11 @@ BO_ 256 Motor: 4 ECU
  SG_ n_em : 16|16@1- (1,0) [0|0] "rpm" ECU
 """
 MAP = "dbc: car.dbc\ncolumns: {T_em: {to: T_em, unit: N*m}}\n"
-ASC = "date Fri Mar 5 10:30:25.000 am 2024\nbase hex  timestamps absolute\nno internal events logged\n"
+ASC = """\
+date Fri Mar 5 10:30:25.000 am 2024
+base hex  timestamps absolute
+no internal events logged
+"""
 TORQUES = (2.0, -1.25, 40.0)
 
 

@@ -234,7 +234,7 @@ class TestCan:
         path = tmp_path / f"drive.{ending}"
         write_can(path)
         path.write_bytes(bytes(range(256)) * 3)
-        assert "error: the" in told(path, self.DBC + COLUMNS)
+        assert "log of CAN frames" in told(path, self.DBC + COLUMNS)
 
 
 @pytest.mark.parametrize(
