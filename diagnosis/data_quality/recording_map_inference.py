@@ -24,7 +24,7 @@ from engine.recordings.recording_file import RecordedFile, Samples
 from language.expressions.units import NO_UNIT, PURE_NUMBER, Unit, are_compatible, parse_unit
 from language.model.system import ColumnMapping, RecordingMap
 from language.overlays.expand_document import display_path
-from language.text.diagnostic import Problems, Source, Span
+from language.text.diagnostic import Problems, Source, Span, SpecError
 from language.text.document import ScalarNode
 
 TIME_NAME = re.compile(r"(t|time|timestamp|zeit)(_(s|ms|us))?", re.IGNORECASE)
@@ -115,7 +115,7 @@ def _left_out_findings(file: RecordedFile, mapping: RecordingMap, name: str) -> 
             found += _clock_findings(file, column, mapping, name)
             text = "looks like the time of other columns"
         elif column not in aliases:
-            text, severity = _explain_no_number(file.read(column))
+            text, severity = _explain_left_out(file, column)
         if not text:
             continue
         if file.is_stamped and severity == "error":
@@ -133,8 +133,17 @@ def _unknown_unit_findings(
     for column in mapping.columns.values():
         written = column.file_unit.strip()
         if column.name in file.names and written not in UNSTATED and file_unit(written) is None:
-            text = f"has the unknown unit '{written[:MAX_SHOWN]}': read as {column.unit.text}"
+            text = f"has the unknown unit '{written[:MAX_SHOWN].replace('`', '')}': "
+            text += f"the unit {column.unit.text} is assumed"
             yield Finding("reading", name, column.name, text, "note")
+
+
+def _explain_left_out(file: RecordedFile, column: str) -> tuple[str, Severity]:
+    """Return why a column is none of numbers, or cannot be read, and how severe that is."""
+    try:
+        return _explain_no_number(file.read(column))
+    except SpecError as error:
+        return f"cannot be read ({error.problems[0].label.replace('`', '')})", "warning"
 
 
 def _explain_no_number(samples: Samples) -> tuple[str, Severity]:
@@ -202,8 +211,14 @@ def _find_time_column(file: RecordedFile, problems: Problems) -> str:
 
 
 def _is_number(file: RecordedFile, name: str) -> bool:
-    """Return whether over 20 % of the cells are finite and few are not finite."""
-    values = file.read(name).values
+    """Return whether over 20 % of the cells are finite and few are not finite.
+
+    A column that cannot be read is none of numbers.
+    """
+    try:
+        values = file.read(name).values
+    except SpecError:
+        return False
     is_finite = [math.isfinite(value) for value in values if value is not None]
     number, bad = is_finite.count(True), is_finite.count(False)
     return number > MIN_NUMBER_FRACTION * len(values) and bad <= number // 10

@@ -54,7 +54,7 @@ class CanSignal:
         else:
             first = start
         needed = (first + self.signal.length + 7) // 8
-        own = max(int(self.message.length), needed)
+        own: int = max(self.message.length, needed)
         return max(own, self.selector.length) if self.selector else own
 
     @cached_property

@@ -200,7 +200,7 @@ class _DecodedLog:
             notes.append(self._explain_short(signal, frames))
         if not whole:
             label = f"all frames of message `{signal.message.name}` are short: {notes[-1]}"
-            raise SpecError([Problem("value", Span(self.source, frames[0].line, 1), label)])
+            raise SpecError([Problem("empty", Span(self.source, frames[0].line, 1), label)])
         if signal.selector is not None:
             notes += _unknown_selections(signal, whole)
         used = [frame for frame in whole if signal.is_selected(frame.data)]
