@@ -6,6 +6,7 @@ A DBC statement that cantools refuses is left out and noted, so that the other m
 from __future__ import annotations
 
 import copy
+import logging
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -167,6 +168,7 @@ def read_databases(mapping: RecordingMap, cantools: Any) -> tuple[list[Any], lis
     the project. A message that two databases define in the same way is returned once. Raises
     SpecError.
     """
+    logging.getLogger("cantools").setLevel(logging.CRITICAL)
     problems = Problems()
     messages: dict[str, Any] = {}
     notes: list[str] = []
@@ -224,7 +226,10 @@ def _read_database(
         return []
     if left_out:
         rest = f", and {len(left_out) - 1} more" if len(left_out) > 1 else ""
-        notes.append(f"`{written.text}`: {left_out[0]}{rest} cannot be understood: left out")
+        notes.append(
+            f"left out: {left_out[0]}{rest} of `{written.text}`, which does not fit the others "
+            "or is no statement of a DBC"
+        )
     if left_out and not messages:
         label = f"`{written.text}` cannot be understood: {left_out[0]} is no statement of a DBC"
         problems.error("unreadable", written.span, label)

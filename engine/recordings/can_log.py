@@ -20,7 +20,7 @@ from language.text.diagnostic import Problem, Source, Span, SpecError
 LOG_SUFFIXES = (".blf", ".asc", ".log", ".trc")
 """Suffixes of logs of CAN frames."""
 CANDUMP_LINE = re.compile(
-    r"\s*\(\d+\.\d+\)\s+\S+\s+(?P<id>[0-9A-F]{3}|[0-9A-F]{8})#"
+    r"\s*\(\d+(?:\.\d+)?\)\s+\S+\s+(?P<id>[0-9A-F]{3}|[0-9A-F]{8})#"
     r"(?:#[0-9A-F](?:[0-9A-F]{2})*|(?:[0-9A-F]{2})*|R[0-9A-F]?)(?:\s+[RT])?\s*",
     re.IGNORECASE | re.ASCII,
 )
@@ -35,6 +35,11 @@ ASC_RELATIVE = re.compile(r"\s*base\s+(?:hex|dec)\s+timestamps\s+relative", re.I
 """Pattern of the ASC header whose stamps are differences to the line before."""
 ASC_FD_EVENT = re.compile(r"\s*[\d.]+\s+CANFD\s+[A-Z]", re.IGNORECASE)
 """Pattern of an ASC line of CAN FD that is no frame, such as the start of the measurement."""
+TRC_FRAME = re.compile(
+    r"\s*\d+\)?\s+[\d.]+\s+"
+    r"(?:(?:\d+\s+)?(?:Rx|Tx|DT|FD|FB|FE|BI)\s|(?!FFFFFFFF)[0-9A-F]{4,8}\s+\d)"
+)
+"""Pattern of the start of a frame in a TRC log."""
 TRC_VERSIONS = "1.0, 1.1, 1.3, 2.0 and 2.1"
 """Versions of TRC that python-can reads."""
 MAX_SHOWN = 60
@@ -111,9 +116,9 @@ def remove_repeated_frames(
         count += len(series) - len(kept)
         result[key] = kept
     if count:
-        notes.append(
-            f"{count} frames repeat the time stamp and the data of the frame before: left out"
-        )
+        total = sum(map(len, frames.values()))
+        text = f"left out: {count} of {total} frames, which repeat the time stamp and the data of "
+        notes.append(text + "the frame before")
     return result
 
 
@@ -143,15 +148,13 @@ def _read_binary(path: Path, source: Source, can: Any, notes: list[str]) -> list
             frames.extend(enumerate(log, start=1))
             size, stated = path.stat().st_size, log.file_size
         if size < stated:
-            notes.append(f"the log is cut: it has {size} of {stated} bytes")
+            notes.append(f"left out: the end of the log, which has {size} of {stated} bytes")
     except Exception as error:  # the library raises errors of any type for a broken file
         if not frames:
-            action = f"understood as a log of CAN frames: {first_line(error)}"
-            raise unreadable_error(source, action, "a file `.blf` is a BLF log") from None
-        notes.append(
-            f"the log is damaged behind its frame {len(frames)} ({first_line(error)}): "
-            "the rest is left out"
-        )
+            action = "understood as a log of CAN frames: it is no BLF file, or it is damaged"
+            raise unreadable_error(source, action) from None
+        text = f"left out: all frames behind frame {len(frames)}, where the log is damaged"
+        notes.append(f"{text} ({first_line(error)})")
     return frames
 
 
@@ -172,13 +175,18 @@ def _read_text(path: Path, source: Source, can: Any, notes: list[str]) -> list[t
         checked = _check_asc(lines, notes)
     else:
         reader, checked = can.TRCReader, lines
-    frames = list(_parse_lines(reader, checked, is_header, bad))
+    header = [(number, line) for number, line in checked if is_header(line)]
+    body = [(number, line) for number, line in checked if not is_header(line)]
+    if suffix == ".asc":
+        header = _complete_asc_header(header, notes)
+    frames = list(_parse_lines(reader, header, body, bad))
     bad.sort()
     if len(bad) > len(frames) or not frames:
         raise _no_log_error(source, suffix, lines, bad)
     if bad:
+        first = bad[0]
         rest = f", and {len(bad) - 1} more" if len(bad) > 1 else ""
-        notes.append(f"line {bad[0].number}{rest}: {bad[0].reason}, left out")
+        notes.append(f"left out: line {first.number}{rest}; {first.reason}: `{_crop(first.text)}`")
     return frames
 
 
@@ -205,7 +213,7 @@ def _check_candump(lines: Iterable[tuple[int, str]], bad: list[_BadLine]) -> lis
             if not int(match["id"], 16) & CANDUMP_ERROR_FLAG:
                 result.append((number, line))
         elif line.strip():
-            bad.append(_BadLine(number, line, "this is no complete frame"))
+            bad.append(_BadLine(number, line, "it is no complete frame"))
     return result
 
 
@@ -216,7 +224,7 @@ def _drop_cut_line(text: str, lines: list[tuple[int, str]], bad: list[_BadLine])
     """
     if lines and not text.endswith(("\n", "\r")) and lines[-1][1].lstrip()[:1].isdigit():
         number, line = lines.pop()
-        bad.append(_BadLine(number, line, "this line may be cut: it has no line break"))
+        bad.append(_BadLine(number, line, "it may be cut, because it has no line break"))
 
 
 def _check_asc(lines: Sequence[tuple[int, str]], notes: list[str]) -> list[tuple[int, str]]:
@@ -243,6 +251,19 @@ def _check_asc(lines: Sequence[tuple[int, str]], notes: list[str]) -> list[tuple
     if has_comma:
         notes.append("the time stamps have decimal commas")
     return result
+
+
+def _complete_asc_header(
+    header: Sequence[tuple[int, str]], notes: list[str]
+) -> list[tuple[int, str]]:
+    """Return the header of an ASC log with its last line, which python-can expects.
+
+    Without that line it would skip the first frame. A header without the base is noted.
+    """
+    if not any(re.match(r"\s*base\s", line, re.IGNORECASE) for _, line in header):
+        notes.append("the log does not state its base: its numbers are taken as hexadecimal")
+    parts = [one for one in header if "events" not in one[1].lower()]
+    return [*parts, (0, "internal events logged")]
 
 
 def _is_asc_header(line: str) -> bool:
@@ -279,33 +300,34 @@ class _LineFeed:
 
 def _parse_lines(
     reader: Callable[[Any], Any],
-    lines: Sequence[tuple[int, str]],
-    is_header: Callable[[str], bool],
+    header: Sequence[tuple[int, str]],
+    body: Sequence[tuple[int, str]],
     bad: list[_BadLine],
 ) -> Iterator[tuple[int, Any]]:
     """Yield the frames of a text log with the numbers of their lines.
 
     The reader of python-can starts again, with the header, behind each line at which it fails;
-    these lines are added to `bad`.
+    these lines are added to `bad`, and so are frames of TRC that it skips.
     """
-    header = [(number, line) for number, line in lines if is_header(line)]
-    body = [(number, line) for number, line in lines if not is_header(line)]
-    texts = dict(body)
+    texts = {number: line for number, line in (*header, *body)}
+    positions = {number: k for k, (number, _) in enumerate(body)}
+    read: set[int] = set()
     start = 0
     while start < len(body):
         feed = _LineFeed([*header, *body[start:]])
         try:
             for frame in reader(feed):
+                read.add(feed.number)
                 yield feed.number, frame
-            return
-        except Exception as error:  # the library raises errors of any type for a broken line
+            start = len(body)
+        except Exception:  # the library raises errors of any type for a broken line
             failed = feed.number
-            text = texts.get(failed, "")
-            bad.append(_BadLine(failed, text, f"this is no complete frame ({first_line(error)})"))
-            numbers = [number for number, _ in body[start:]]
-            if failed not in numbers:
-                return
-            start += numbers.index(failed) + 1
+            bad.append(_BadLine(failed, texts[failed], "it is no complete frame"))
+            read.add(failed)
+            start = positions.get(failed, len(body)) + 1
+    for number, line in body:
+        if number not in read and TRC_FRAME.match(line):
+            bad.append(_BadLine(number, line, "it is no complete frame"))
 
 
 def _no_log_error(
@@ -324,7 +346,14 @@ def _no_log_error(
     if suffix == ".log" and CANDUMP_SCREEN.match(line):
         label = "this is what `candump` writes to the screen, and no log"
         help = "`candump -L` or `candump -l` write a log"
-    shown = line.strip()
-    if shown:
-        label += f": `{shown[:MAX_SHOWN]}{'...' if len(shown) > MAX_SHOWN else ''}`"
+    if suffix == ".log" and not bad:
+        label, help = "the log has no data frames", ""
+    elif line.strip():
+        label += f": `{_crop(line)}`"
     return SpecError([Problem("unreadable", Span(source, number, 1), label, help)])
+
+
+def _crop(line: str) -> str:
+    """Return the first `MAX_SHOWN` characters of a line without outer blanks."""
+    text = line.strip()
+    return text if len(text) <= MAX_SHOWN else text[:MAX_SHOWN] + "..."

@@ -199,7 +199,7 @@ class _DecodedLog:
         if len(whole) < len(frames):
             notes.append(self._explain_short(signal, frames))
         if not whole:
-            label = f"all frames of message `{signal.message.name}` are short: {notes[-1]}"
+            label = f"message `{signal.message.name}` has no whole frame: {notes[-1]}"
             raise SpecError([Problem("empty", Span(self.source, frames[0].line, 1), label)])
         if signal.selector is not None:
             notes += _unknown_selections(signal, whole)
@@ -210,7 +210,7 @@ class _DecodedLog:
             for word, frame in zip(words, used, strict=True)
         ]
         for word, number in Counter(filter(None, words)).items():
-            notes.append(f"{number} values are `{word}` by the DBC: they have no value")
+            notes.append(f"no value: {number} of {len(used)} samples, which the DBC calls `{word}`")
         return Samples(
             values,
             lambda k: words[k] or repr(values[k]),
@@ -242,9 +242,8 @@ class _DecodedLog:
         short = [frame for frame in frames if len(frame.data) < signal.length]
         first = short[0]
         return (
-            f"{len(short)} of {len(frames)} frames of message `{signal.message.name}` are left "
-            f"out: the one at {first.time!r} s has {len(first.data)} bytes, "
-            f"the DBC says {signal.length}"
+            f"left out: {len(short)} of {len(frames)} frames of message `{signal.message.name}`; "
+            f"the one at {first.time!r} s has {len(first.data)} bytes, the DBC says {signal.length}"
         )
 
 
@@ -264,8 +263,9 @@ def _unknown_selections(signal: CanSignal, frames: list[CanFrame]) -> list[str]:
         if found:
             values = _join(str(value) for value in sorted(found, key=lambda value: value or 0))
             notes.append(
-                f"{found.total()} frames of message `{signal.message.name}` are left out: the DBC "
-                f"does not know the value {values} of its multiplexer `{selector.signal.name}`"
+                f"left out: {found.total()} of {len(frames)} frames of message "
+                f"`{signal.message.name}`, because the DBC does not know the value {values} of its "
+                f"multiplexer `{selector.signal.name}`"
             )
         selector = selector.selector
     return notes

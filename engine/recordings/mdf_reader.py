@@ -97,7 +97,7 @@ def _open_mdf(asammdf: Any, data: bytes, source: Source) -> Any:
     finally:
         gc.collect()  # destructors of broken objects run while their errors are suppressed
         sys.unraisablehook = hook
-    raise unreadable_error(source, f"understood as MDF: {message}")
+    raise unreadable_error(source, f"understood as MDF, it may be damaged: {message}")
 
 
 @dataclass(frozen=True)
@@ -324,7 +324,7 @@ def _convert_texts(
             numbers.append(float(raw[k]) if is_enumeration or not text else math.nan)
     missing = Counter(text for text in texts if NO_VALUE.fullmatch(text))
     for word, count in missing.items():
-        notes.append(f"{count} values are `{word}`: they have no value")
+        notes.append(f"no value: {count} of {len(texts)} samples, which the file calls `{word}`")
     codes = {t: n for t, n in zip(texts, numbers, strict=True) if n is not None and t}
     if is_enumeration and not is_text and codes:
         listed = ", ".join(f"`{word}` is {number:g}" for word, number in list(codes.items())[:6])

@@ -92,7 +92,7 @@ class TestBuses:
         path = write(tmp_path, "a.log", "".join(f"{one} T\n{one} R\n" for one in line))
         found = read(path, MAP)
         assert values_of(found) == TORQUES
-        assert any("3 frames repeat the time stamp" in note for note in notes_of(found))
+        assert notes_of(found)[0].startswith("left out: 3 of 6 frames, which repeat")
 
 
 class TestBadItems:
@@ -102,7 +102,7 @@ class TestBadItems:
         found = read(path, MAP)
         assert values_of(found) == TORQUES
         (note,) = notes_of(found)
-        assert note.startswith("1 of 4 frames of message `Motor` are left out: the one at 2.0 s")
+        assert note.startswith("left out: 1 of 4 frames of message `Motor`; the one at 2.0 s")
 
     @pytest.mark.parametrize(
         "line", ["(2.0) can0 100#0800640", "(2.0) can", "junk", "(2.0) can0 100"]
@@ -110,21 +110,24 @@ class TestBadItems:
     def test_a_cut_line_is_left_out_and_told(self, tmp_path: Path, line: str) -> None:
         found = read(write(tmp_path, "a.log", motor_lines() + line), MAP)
         assert values_of(found) == TORQUES
-        assert notes_of(found) == ["line 4: this is no complete frame, left out"]
+        assert notes_of(found) == [f"left out: line 4; it is no complete frame: `{line}`"]
 
     def test_a_cut_line_of_asc_is_left_out_and_told(self, tmp_path: Path) -> None:
         line = "   {:.6f} 1  100             Rx   d 4 08 00 64 00"
         text = "\n".join(line.format(0.01 * k) for k in range(3))
         found = read(write(tmp_path, "a.asc", ASC + text[:-1]), MAP)
         assert values_of(found) == (2.0, 2.0)
-        assert notes_of(found) == ["line 6: this line may be cut: it has no line break, left out"]
+        (note,) = notes_of(found)
+        assert note.startswith(
+            "left out: line 6; it may be cut, because it has no line break: `0.02"
+        )
 
     def test_a_line_that_the_library_refuses_is_left_out(self, tmp_path: Path) -> None:
         line = "   {:.6f} 1  100             Rx   d 4 {} 00 64 00"
         rows = [line.format(0.01 * k, "0G" if k == 2 else "08") for k in range(6)]
         found = read(write(tmp_path, "a.asc", ASC + "\n".join(rows) + "\n"), MAP)
         assert len(values_of(found)) == 5
-        assert notes_of(found)[0].startswith("line 6: this is no complete frame (")
+        assert notes_of(found)[0].startswith("left out: line 6; it is no complete frame: `0.02")
 
     def test_error_frames_are_no_data(self, tmp_path: Path) -> None:
         rows = candump((1.5, "can0", "20000004#0008000000000000"), (1.6, "can0", "100#R"))
@@ -150,11 +153,13 @@ class TestBadItems:
         path.write_bytes(data[:half])
         found = read(path, MAP)
         assert 0 < len(values_of(found)) < 600
-        assert notes_of(found) == [f"the log is cut: it has {half} of {len(data)} bytes"]
+        assert notes_of(found) == [
+            f"left out: the end of the log, which has {half} of {len(data)} bytes"
+        ]
         path.write_bytes(data[:half] + bytes([data[half] ^ 255]) + data[half + 1 :])
         found = read(path, MAP)
         assert 0 < len(values_of(found)) < 600
-        assert notes_of(found)[0].startswith("the log is damaged behind its frame ")
+        assert notes_of(found)[0].startswith("left out: all frames behind frame ")
 
 
 class TestDatabases:
@@ -179,7 +184,7 @@ class TestDatabases:
         found = read(write(tmp_path, "a.log", motor_lines(), f"{MOTOR}\n{stray}\n"), MAP)
         assert values_of(found) == TORQUES
         (note,) = notes_of(found)
-        assert note.startswith("`car.dbc`: line 9 (`") and note.endswith("left out")
+        assert note.startswith("left out: line 9 (`") and "of `car.dbc`" in note
 
     def test_two_stray_tables_of_values_are_both_left_out(self, tmp_path: Path) -> None:
         dbc = MOTOR + '\nVAL_ 256 x 0 "a" ;\nVAL_ 256 T_em 1 "one" ;\nVAL_ 256 y 0 "a" ;\n'
@@ -199,7 +204,7 @@ class TestDatabases:
         path = write(tmp_path, "a.log", motor_lines(), dbc)
         found = read(path, MAP.replace("unit: N*m", "unit: N*m, blank: skip"))
         assert values_of(found) == TORQUES[1:]
-        assert notes_of(found) == ["1 values are `SNA` by the DBC: they have no value"]
+        assert notes_of(found) == ["no value: 1 of 3 samples, which the DBC calls `SNA`"]
 
 
 class TestUnits:
@@ -242,7 +247,7 @@ BO_ 512 Muxed: 4 ECU
         found = read(path, MAP)
         assert values_of(found) == (5.0, 6.0)
         (note,) = notes_of(found)
-        assert note.startswith("1 frames of message `Muxed` are left out")
+        assert note.startswith("left out: 1 of 4 frames of message `Muxed`")
         assert "the value 7 of its multiplexer `sel`" in note
         every = read(path, MAP.replace("T_em: {", "base: {"))
         assert values_of(every, "base") == (7.0, 7.0, 7.0, 8.0) and not every.notes
@@ -352,6 +357,31 @@ class TestText:
     def test_trc_is_read(self, tmp_path: Path, text: str) -> None:
         found = read(write(tmp_path, "a.trc", text), MAP)
         assert values_of(found) == (2.0,)
+
+    def test_a_frame_of_trc_without_its_last_byte_is_told(self, tmp_path: Path) -> None:
+        line = "     {})         1.5  Rx     0100  4  08 00 64"
+        lines = [";$FILEVERSION=1.1", ";$STARTTIME=45000.5", line.format(1), line.format(2) + " 00"]
+        found = read(write(tmp_path, "a.trc", "\n".join(lines) + "\n"), MAP)
+        assert values_of(found) == (2.0,)
+        assert notes_of(found)[0].startswith("left out: line 3; it is no complete frame: `1)")
+
+    def test_a_damaged_header_is_told_with_its_line(self, tmp_path: Path) -> None:
+        text = ";$FILEVERSION=1.1\n;$STARTTIME=noon\n   1)  1.5  Rx  0100  1  08\n"
+        found = told(write(tmp_path, "a.trc", text), MAP)
+        assert "a.trc:2:1: error: this is no log of CAN frames: `;$STARTTIME=noon`" in found
+
+    @pytest.mark.parametrize("header", ["", "base hex  timestamps absolute\n"])
+    def test_an_asc_log_with_half_a_header_loses_no_frame(
+        self, tmp_path: Path, header: str
+    ) -> None:
+        found = read(write(tmp_path, "a.asc", self.asc(["0.01", "0.02"], header)), MAP)
+        assert len(values_of(found)) == 2
+        assert bool(found.notes) == (not header)
+
+    def test_a_log_of_error_frames_has_no_data(self, tmp_path: Path) -> None:
+        rows = candump((1.5, "can0", "20000004#0008000000000000"))
+        text = told(write(tmp_path, "a.log", rows), MAP)
+        assert "error: the log has no data frames" in text
 
     def test_unsorted_frames_are_told_with_all_digits(self, tmp_path: Path) -> None:
         text = candump(

@@ -129,7 +129,7 @@ class TestTexts:
         path = write(tmp_path / "a.mf4", signal(np.array([1, 255, 20], "u1"), conversion=words))
         found = read(path, MAP.replace("unit: N*m", "unit: N*m, blank: skip"))
         assert values_of(found) == (1.0, 20.0)
-        assert notes_of(found) == ["1 values are `SNA`: they have no value"]
+        assert notes_of(found) == ["no value: 1 of 3 samples, which the file calls `SNA`"]
 
     def test_a_word_among_numbers_is_no_number(self, tmp_path: Path) -> None:
         words = {"val_0": 255, "text_0": "standstill", "default": b""}

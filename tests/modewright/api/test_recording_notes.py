@@ -34,7 +34,7 @@ BU_: ECU
 BO_ 256 Motor: 2 ECU
  SG_ T_em : 0|16@1- (0.25,0) [0|0] "Nm" ECU
 """
-SHORT = "1 of 21 frames of message `Motor` are left out: the one at 1.2 s has 1 bytes"
+SHORT = "left out: 1 of 21 frames of message `Motor`; the one at 1.2 s has 1 bytes"
 
 
 @pytest.fixture
@@ -64,7 +64,7 @@ def test_the_check_of_a_recording_tells_each_note_once(
     findings = json.loads(capsys.readouterr().out)["findings"]
     notes = [(f["channel"], f["text"]) for f in findings if f["kind"] == "reading"]
     assert [channel for channel, _ in notes] == ["", "T_em"]
-    assert notes[0][1] == "line 22: this is no complete frame, left out"
+    assert notes[0][1] == "left out: line 22; it is no complete frame: `(1.210000) ca`"
     assert notes[1][1].startswith(SHORT)
     assert {f["severity"] for f in findings if f["kind"] == "reading"} == {"note"}
 
@@ -73,7 +73,7 @@ def test_a_replay_tells_the_notes(project: Path, capsys: pytest.CaptureFixture[s
     assert run("replay", "selector", "drive.log", "--map", "bench") == 0
     text = " ".join(capsys.readouterr().out.split())
     assert text.count(f"note: T_em: {SHORT}") == 1
-    assert "note: line 22: this is no complete frame, left out" in text
+    assert "note: left out: line 22; it is no complete frame" in text
     assert run("replay", "selector", "drive.log", "--map", "bench", "--json") == 0
     notes = json.loads(capsys.readouterr().out)["notes"]
     assert [note["channel"] for note in notes] == ["", "T_em"]
