@@ -9,7 +9,7 @@ from typing import Literal
 Severity = Literal["error", "warning", "note"]
 """An error makes a diagnosis unreliable, a warning may, a note does not."""
 SEVERITIES: tuple[Severity, ...] = ("error", "warning", "note")
-UNGROUPED_KINDS = ("no_signal", "outlier", "leap", "left_out", "reading")
+UNGROUPED_KINDS = ("no_signal", "outlier", "leap", "left_out")
 """Kinds whose findings share a line only if their texts are equal."""
 
 
@@ -18,7 +18,7 @@ class Finding:
     """A finding on a channel (its name in the map), or on the whole recording if that is empty.
 
     The kinds are too_short, no_signal, dropped, gap, jitter, repeated, stuck, clipped,
-    no_excitation, outlier, leap, time, clock_offset, sign, unit, swap, scale, left_out and reading.
+    no_excitation, outlier, leap, time, clock_offset, sign, unit, swap, scale and left_out.
     """
 
     kind: str

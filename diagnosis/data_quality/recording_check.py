@@ -24,6 +24,7 @@ from diagnosis.data_quality.unit_sign_clock_errors import (
     find_unit_sign_clock_errors,
 )
 from engine.recordings.recording import Recording
+from engine.recordings.recording_file import Assumption
 from language.model.automaton import Automaton
 from language.model.system import RecordingMap
 
@@ -36,12 +37,16 @@ MIN_SAMPLES = 100
 
 @dataclass(frozen=True)
 class RecordingCheck:
-    """The channels, findings (errors first), excitation and agreement with a simulation."""
+    """The channels, findings (errors first), excitation and agreement with a simulation.
+
+    `assumptions` are what was taken of each recording that its file does not state.
+    """
 
     channels: tuple[ChannelCheck, ...]
     findings: tuple[Finding, ...]
     excitation: Excitation
     agreements: tuple[OutputAgreement, ...] = ()
+    assumptions: tuple[tuple[str, Assumption], ...] = ()
 
     @property
     def is_usable(self) -> bool:
@@ -63,6 +68,7 @@ def check_recordings(
     the clock findings of the simulation are then warnings. Sampled automata are not simulated.
     Raises SpecError if the simulation of a recording fails.
     """
+    assumptions = tuple((one.name, item) for one in recordings for item in one.assumptions)
     mismatches = {one.name: find_clock_mismatches(one) for one in recordings}
     early_findings: list[Finding] = []
     for one in recordings:
@@ -78,11 +84,6 @@ def check_recordings(
         if (finding.recording, finding.channel) not in outlying
     ]
     findings += [*_find_insufficient_data(recordings, channels, excited), *file_findings]
-    findings += [
-        Finding("reading", one.name, note.channel, note.text, "note")
-        for one in recordings
-        for note in one.notes
-    ]
     reference = None
     if automaton is not None and automaton.period is None:
         reference = cached_reference(automaton, mapping, run_programs)
@@ -100,7 +101,9 @@ def check_recordings(
         errors = replace_corrected(errors, corrections)
         errors = [one for one in errors if not agrees_with_other_outputs(one, agreements)]
         findings += _merge_clock_errors(errors, usable, find_clock_errors)
-    return RecordingCheck(tuple(channels), sort_by_severity(findings), excited, tuple(agreements))
+    return RecordingCheck(
+        tuple(channels), sort_by_severity(findings), excited, tuple(agreements), assumptions
+    )
 
 
 def _check_channels(

@@ -18,16 +18,26 @@ from diagnosis.data_quality.clock_overlap import (
     lacking_overlap,
 )
 from diagnosis.data_quality.finding import Finding, Severity
-from engine.recordings.channel_reader import UNSTATED, file_unit
+from engine.recordings.channel_reader import file_unit
 from engine.recordings.recording import open_recording
 from engine.recordings.recording_file import RecordedFile, Samples
-from language.expressions.units import NO_UNIT, PURE_NUMBER, Unit, are_compatible, parse_unit
+from language.expressions.unit_spellings import unit_meanings
+from language.expressions.units import (
+    NO_UNIT,
+    PURE_NUMBER,
+    SECOND,
+    Unit,
+    are_compatible,
+    parse_unit,
+)
 from language.model.system import ColumnMapping, RecordingMap
 from language.overlays.expand_document import display_path
 from language.text.diagnostic import Problems, Source, Span, SpecError
 from language.text.document import ScalarNode
 
-TIME_NAME = re.compile(r"(t|time|timestamp|zeit)(_(s|ms|us))?", re.IGNORECASE)
+TIME_NAME = re.compile(
+    r"(t|time|timestamp|datetime|zeit|ms_today)(_(s|ms|us|ns)| ?[\[(]\w+[\])])?", re.IGNORECASE
+)
 CHANNEL_TIME_NAME = re.compile(r"(t|time)_\w+_(s|ms|us)", re.IGNORECASE)
 """Names of time columns: of the whole file, and of single columns (these are not read)."""
 UNIT_SUFFIXES = {
@@ -38,6 +48,8 @@ UNIT_SUFFIXES = {
 """Units by the suffixes of column names."""
 INPUT_UNITS = ("N*m", "N")
 """Columns with these units are inputs, all others outputs."""
+EPOCH_UNITS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
+"""Units of epochs by their smallest stamp."""
 MAX_COLUMNS = 12
 """Maximum number of columns of a guessed map."""
 MIN_NUMBER_FRACTION = 0.2
@@ -69,8 +81,7 @@ def guess_map(
     problems.raise_if_errors()
     time = "" if files[0].is_stamped else _find_time_column(files[0], problems)
     problems.raise_if_errors()
-    ending = time.rpartition("_")[2].lower()
-    unit = parse_unit(ending) if ending in ("ms", "us") else second
+    unit, reason = _guess_time_unit(files[0].read(time), time) if time else (second, "")
     columns: dict[str, ColumnMapping] = {}
     for path, file in zip(paths, files, strict=True):
         span = Span(Source(display_path(path)), 1, 1)
@@ -84,11 +95,11 @@ def guess_map(
     findings = [
         finding
         for path, file in zip(paths, files, strict=True)
-        for finding in (
-            *_left_out_findings(file, mapping, names[path]),
-            *_unknown_unit_findings(file, mapping, names[path]),
-        )
+        for finding in _left_out_findings(file, mapping, names[path])
     ]
+    if reason:
+        text = f"the time `{time}` is taken in {unit.text}: {reason}"
+        findings += [Finding("unit", name, time, text, "note") for name in names.values()]
     return mapping, tuple(findings)
 
 
@@ -108,6 +119,10 @@ def _left_out_findings(file: RecordedFile, mapping: RecordingMap, name: str) -> 
         if list(file.names).count(column) > 1:
             text, severity = "is in the file twice", "error"
         elif column == mapping.time or column in mapping.columns:
+            written = mapping.columns[column].file_unit if column in mapping.columns else ""
+            if written:
+                text = f"has the unit `{written}`, which is not understood: taken without a unit"
+                found.append(Finding("unit", name, column, text, "warning"))
             continue
         elif column in candidates:
             text = f"is not among the first {MAX_COLUMNS} columns"
@@ -124,18 +139,6 @@ def _left_out_findings(file: RecordedFile, mapping: RecordingMap, name: str) -> 
         text += ": left out (--map says which columns are read)"
         found.append(Finding("left_out", name, column, text, severity))
     return found
-
-
-def _unknown_unit_findings(
-    file: RecordedFile, mapping: RecordingMap, name: str
-) -> Iterator[Finding]:
-    """Yield a note on each column of a guessed map whose unit in the file is unknown."""
-    for column in mapping.columns.values():
-        written = column.file_unit.strip()
-        if column.name in file.names and written not in UNSTATED and file_unit(written) is None:
-            text = f"has the unknown unit '{written[:MAX_SHOWN].replace('`', '')}': "
-            text += f"the unit {column.unit.text} is assumed"
-            yield Finding("reading", name, column.name, text, "note")
 
 
 def _explain_left_out(file: RecordedFile, column: str) -> tuple[str, Severity]:
@@ -210,6 +213,24 @@ def _find_time_column(file: RecordedFile, problems: Problems) -> str:
     return ""
 
 
+def _guess_time_unit(samples: Samples, name: str) -> tuple[Unit, str]:
+    """Return the unit of time, and the reason if it follows neither from the file nor its names.
+
+    It is the unit that the file states, else the one in the name (`t_ms`, `ms_today`), else that of
+    an epoch of this century (stamps from 1e11 on are in ms, us or ns), else s.
+    """
+    for unit in unit_meanings(samples.unit):
+        if are_compatible(unit.dimension, SECOND):
+            return unit, ""
+    words = name.lower().split("_")
+    for word in (words[-1], words[0]):
+        if word in ("ms", "us", "ns"):
+            return parse_unit(word), ""
+    first = next((abs(v) for v in samples.values if v is not None and math.isfinite(v)), 0.0)
+    epoch = next((text for start, text in EPOCH_UNITS if first >= start), "")
+    return parse_unit(epoch or "s"), "its values are epochs of this century" if epoch else ""
+
+
 def _is_number(file: RecordedFile, name: str) -> bool:
     """Return whether over 20 % of the cells are finite and few are not finite.
 
@@ -225,7 +246,10 @@ def _is_number(file: RecordedFile, name: str) -> bool:
 
 
 def _guess_column(name: str, written: str, span: Span) -> ColumnMapping:
-    """Return the mapping of a column: an input for `INPUT_UNITS`, else an output."""
+    """Return the mapping of a column: an input for `INPUT_UNITS`, else an output.
+
+    A unit of the file that is not understood is accepted as it is.
+    """
     unit = _guess_unit(name, written)
     drives = any(are_compatible(unit.dimension, parse_unit(text).dimension) for text in INPUT_UNITS)
     return ColumnMapping(
@@ -240,7 +264,7 @@ def _guess_column(name: str, written: str, span: Span) -> ColumnMapping:
         blank="skip",
         time=None,
         span=span,
-        file_unit=written,
+        file_unit="" if unit_meanings(written) else written,
     )
 
 

@@ -1,6 +1,6 @@
 """CAN database: reads DBC files (also ARXML, KCD, SYM) as messages, and decodes single signals.
 
-A DBC statement that cantools refuses is left out and noted, so that the other messages can be read.
+A DBC statement that cantools refuses is left out and told, so that the other messages can be read.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from engine.recordings.recording_file import NO_VALUE, first_line
+from engine.recordings.recording_file import Assumption, first_line
 from language.model.system import RecordingMap
 from language.text.diagnostic import Problems
 from language.text.document import ScalarNode
@@ -90,16 +90,12 @@ class CanSignal:
             return False
         return int(self.selector.decode(data, is_raw=True)) in self.signal.multiplexer_ids
 
-    def missing_word(self, data: bytes) -> str:
-        """Return the word of the database for this raw value if it means that a value is missing.
-
-        The result is empty for all other values.
-        """
+    def word(self, data: bytes) -> str:
+        """Return the word of the database for the value of a frame; empty if it has none."""
         choices = self.signal.choices
         if not choices:
             return ""
-        word = str(choices.get(int(self.decode(data, is_raw=True)), ""))
-        return word if NO_VALUE.fullmatch(word) else ""
+        return str(choices.get(int(self.decode(data, is_raw=True)), ""))
 
     @property
     def overlapping(self) -> list[str]:
@@ -161,8 +157,8 @@ def is_j1939(message: Any) -> bool:
     return bool(message.protocol == "j1939" or message.frame_id & 0xFF == J1939_NULL_ADDRESS)
 
 
-def read_databases(mapping: RecordingMap, cantools: Any) -> tuple[list[Any], list[str]]:
-    """Return the messages of the databases of a map, and notes on what is left out.
+def read_databases(mapping: RecordingMap, cantools: Any) -> tuple[list[Any], list[Assumption]]:
+    """Return the messages of the databases of a map, and what is left out.
 
     A database is searched relative to the map, then to the working directory, and has to lie inside
     the project. A message that two databases define in the same way is returned once. Raises
@@ -171,7 +167,7 @@ def read_databases(mapping: RecordingMap, cantools: Any) -> tuple[list[Any], lis
     logging.getLogger("cantools").setLevel(logging.CRITICAL)
     problems = Problems()
     messages: dict[str, Any] = {}
-    notes: list[str] = []
+    assumed: list[Assumption] = []
     for written in mapping.databases:
         folders = (Path(written.span.source.name).parent, Path())
         paths = [folder / written.text for folder in folders if path_exists(folder / written.text)]
@@ -188,10 +184,10 @@ def read_databases(mapping: RecordingMap, cantools: Any) -> tuple[list[Any], lis
             require_inside_project(
                 paths[0], written.span, project_root_of(Path(written.span.source.name))
             )
-            for message in _read_database(paths[0], written, cantools, problems, notes):
+            for message in _read_database(paths[0], written, cantools, problems, assumed):
                 messages.setdefault(_definition(message), message)
     problems.raise_if_errors()
-    return list(messages.values()), notes
+    return list(messages.values()), assumed
 
 
 def _definition(message: Any) -> str:
@@ -207,7 +203,7 @@ def _definition(message: Any) -> str:
 
 
 def _read_database(
-    path: Path, written: ScalarNode, cantools: Any, problems: Problems, notes: list[str]
+    path: Path, written: ScalarNode, cantools: Any, problems: Problems, assumed: list[Assumption]
 ) -> Sequence[Any]:
     """Return the messages of a database; a file that cannot be understood is reported."""
     try:
@@ -225,11 +221,9 @@ def _read_database(
         problems.error("unreadable", written.span, label)
         return []
     if left_out:
-        rest = f", and {len(left_out) - 1} more" if len(left_out) > 1 else ""
-        notes.append(
-            f"left out: {left_out[0]}{rest} of `{written.text}`, which does not fit the others "
-            "or is no statement of a DBC"
-        )
+        value = f"{len(left_out)} statements left out"
+        reason = f"{left_out[0]} does not fit the others or is no statement of a DBC"
+        assumed.append(Assumption(f"`{written.text}`", value, reason))
     if left_out and not messages:
         label = f"`{written.text}` cannot be understood: {left_out[0]} is no statement of a DBC"
         problems.error("unreadable", written.span, label)

@@ -1,7 +1,7 @@
 """CAN log: reads the frames of a log (candump, ASC, TRC, BLF) by bus and identifier.
 
 The lines of a text log are checked first, because python-can ends at the first line that it cannot
-parse. Lines that are no complete frames are left out and noted.
+parse. Lines that are no complete frames are left out and told.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from engine.recordings.recording_file import first_line, unreadable_error
+from engine.recordings.recording_file import Assumption, first_line, unreadable_error
 from language.text.diagnostic import Problem, Source, Span, SpecError
 
 LOG_SUFFIXES = (".blf", ".asc", ".log", ".trc")
@@ -64,10 +64,10 @@ class CanFrame(NamedTuple):
 
 @dataclass(frozen=True)
 class CanLog:
-    """Data frames of a log by their keys, and notes on what is left out or assumed."""
+    """Data frames of a log by their keys, and what is left out or assumed."""
 
     frames: dict[FrameKey, list[CanFrame]]
-    notes: tuple[str, ...] = ()
+    assumptions: tuple[Assumption, ...] = ()
 
 
 class _BadLine(NamedTuple):
@@ -87,11 +87,11 @@ def read_can_log(path: Path, source: Source, can: Any) -> CanLog:
     """
     logging.getLogger("can").setLevel(logging.CRITICAL)
     suffix = path.suffix.lower()
-    notes: list[str] = []
+    assumed: list[Assumption] = []
     if suffix == ".blf":
-        numbered = _read_binary(path, source, can, notes)
+        numbered = _read_binary(path, source, can, assumed)
     else:
-        numbered = _read_text(path, source, can, notes)
+        numbered = _read_text(path, source, can, assumed)
     frames: dict[FrameKey, list[CanFrame]] = {}
     for line, frame in numbered:
         if not (frame.is_error_frame or frame.is_remote_frame):
@@ -99,11 +99,11 @@ def read_can_log(path: Path, source: Source, can: Any) -> CanLog:
             key = FrameKey(bus, frame.arbitration_id, frame.is_extended_id)
             found = CanFrame(frame.timestamp, bytes(frame.data), line)
             frames.setdefault(key, []).append(found)
-    return CanLog(remove_repeated_frames(frames, notes), tuple(notes))
+    return CanLog(remove_repeated_frames(frames, assumed), tuple(assumed))
 
 
 def remove_repeated_frames(
-    frames: dict[FrameKey, list[CanFrame]], notes: list[str]
+    frames: dict[FrameKey, list[CanFrame]], assumed: list[Assumption]
 ) -> dict[FrameKey, list[CanFrame]]:
     """Return the frames without those that repeat the stamp and data of the one before.
 
@@ -116,9 +116,9 @@ def remove_repeated_frames(
         count += len(series) - len(kept)
         result[key] = kept
     if count:
-        total = sum(map(len, frames.values()))
-        text = f"left out: {count} of {total} frames, which repeat the time stamp and the data of "
-        notes.append(text + "the frame before")
+        value = f"{count} of {sum(map(len, frames.values()))} left out"
+        reason = "they repeat the time stamp and the data of the frame before"
+        assumed.append(Assumption("frames", value, reason))
     return result
 
 
@@ -137,7 +137,9 @@ def _bus_name(channel: Any, suffix: str) -> str:
     return f"CAN{channel + (suffix in ('.asc', '.blf'))}"
 
 
-def _read_binary(path: Path, source: Source, can: Any, notes: list[str]) -> list[tuple[int, Any]]:
+def _read_binary(
+    path: Path, source: Source, can: Any, assumed: list[Assumption]
+) -> list[tuple[int, Any]]:
     """Return the numbered frames of a BLF file up to its first error or its cut end.
 
     Both are noted. Raises SpecError if there is no frame before the error.
@@ -148,17 +150,20 @@ def _read_binary(path: Path, source: Source, can: Any, notes: list[str]) -> list
             frames.extend(enumerate(log, start=1))
             size, stated = path.stat().st_size, log.file_size
         if size < stated:
-            notes.append(f"left out: the end of the log, which has {size} of {stated} bytes")
+            reason = f"the log has {size} of {stated} bytes"
+            assumed.append(Assumption("end of the log", "left out", reason))
     except Exception as error:  # the library raises errors of any type for a broken file
         if not frames:
             action = "understood as a log of CAN frames: it is no BLF file, or it is damaged"
             raise unreadable_error(source, action) from None
-        text = f"left out: all frames behind frame {len(frames)}, where the log is damaged"
-        notes.append(f"{text} ({first_line(error)})")
+        value = f"all behind frame {len(frames)} left out"
+        assumed.append(Assumption("frames", value, f"the log is damaged: {first_line(error)}"))
     return frames
 
 
-def _read_text(path: Path, source: Source, can: Any, notes: list[str]) -> list[tuple[int, Any]]:
+def _read_text(
+    path: Path, source: Source, can: Any, assumed: list[Assumption]
+) -> list[tuple[int, Any]]:
     """Return the frames of a text log with the numbers of their lines. Raises SpecError."""
     text = _decode_text(path.read_bytes())
     lines = list(enumerate(text.splitlines(), start=1))
@@ -172,21 +177,21 @@ def _read_text(path: Path, source: Source, can: Any, notes: list[str]) -> list[t
         checked = _check_candump(lines, bad)
     elif suffix == ".asc":
         reader, is_header = can.ASCReader, _is_asc_header
-        checked = _check_asc(lines, notes)
+        checked = _check_asc(lines, assumed)
     else:
         reader, checked = can.TRCReader, lines
     header = [(number, line) for number, line in checked if is_header(line)]
     body = [(number, line) for number, line in checked if not is_header(line)]
     if suffix == ".asc":
-        header = _complete_asc_header(header, notes)
+        header = _complete_asc_header(header, assumed)
     frames = list(_parse_lines(reader, header, body, bad))
     bad.sort()
     if len(bad) > len(frames) or not frames:
         raise _no_log_error(source, suffix, lines, bad)
     if bad:
         first = bad[0]
-        rest = f", and {len(bad) - 1} more" if len(bad) > 1 else ""
-        notes.append(f"left out: line {first.number}{rest}; {first.reason}: `{_crop(first.text)}`")
+        reason = f"line {first.number} {first.reason}: `{_crop(first.text)}`"
+        assumed.append(Assumption("lines", f"{len(bad)} left out", reason))
     return frames
 
 
@@ -213,7 +218,7 @@ def _check_candump(lines: Iterable[tuple[int, str]], bad: list[_BadLine]) -> lis
             if not int(match["id"], 16) & CANDUMP_ERROR_FLAG:
                 result.append((number, line))
         elif line.strip():
-            bad.append(_BadLine(number, line, "it is no complete frame"))
+            bad.append(_BadLine(number, line, "is no complete frame"))
     return result
 
 
@@ -224,10 +229,12 @@ def _drop_cut_line(text: str, lines: list[tuple[int, str]], bad: list[_BadLine])
     """
     if lines and not text.endswith(("\n", "\r")) and lines[-1][1].lstrip()[:1].isdigit():
         number, line = lines.pop()
-        bad.append(_BadLine(number, line, "it may be cut, because it has no line break"))
+        bad.append(_BadLine(number, line, "may be cut, because it has no line break"))
 
 
-def _check_asc(lines: Sequence[tuple[int, str]], notes: list[str]) -> list[tuple[int, str]]:
+def _check_asc(
+    lines: Sequence[tuple[int, str]], assumed: list[Assumption]
+) -> list[tuple[int, str]]:
     """Return the lines of an ASC log with absolute stamps and decimal points; both are noted.
 
     Relative stamps are differences to the line before (also to lines that are no frames). Lines of
@@ -247,21 +254,23 @@ def _check_asc(lines: Sequence[tuple[int, str]], notes: list[str]) -> list[tuple
         if not ASC_FD_EVENT.match(line):
             result.append((number, line))
     if is_relative:
-        notes.append("the time stamps are relative: each is added to the one of the line before")
+        reason = "the header states relative time stamps"
+        assumed.append(Assumption("time stamps", "added to those of the lines before", reason))
     if has_comma:
-        notes.append("the time stamps have decimal commas")
+        assumed.append(Assumption("decimal sign", "comma", "the form of the time stamps"))
     return result
 
 
 def _complete_asc_header(
-    header: Sequence[tuple[int, str]], notes: list[str]
+    header: Sequence[tuple[int, str]], assumed: list[Assumption]
 ) -> list[tuple[int, str]]:
     """Return the header of an ASC log with its last line, which python-can expects.
 
     Without that line it would skip the first frame. A header without the base is noted.
     """
     if not any(re.match(r"\s*base\s", line, re.IGNORECASE) for _, line in header):
-        notes.append("the log does not state its base: its numbers are taken as hexadecimal")
+        reason = "the header does not state the base"
+        assumed.append(Assumption("numbers", "hexadecimal", reason))
     parts = [one for one in header if "events" not in one[1].lower()]
     return [*parts, (0, "internal events logged")]
 
@@ -322,12 +331,12 @@ def _parse_lines(
             start = len(body)
         except Exception:  # the library raises errors of any type for a broken line
             failed = feed.number
-            bad.append(_BadLine(failed, texts[failed], "it is no complete frame"))
+            bad.append(_BadLine(failed, texts[failed], "is no complete frame"))
             read.add(failed)
             start = positions.get(failed, len(body)) + 1
     for number, line in body:
         if number not in read and TRC_FRAME.match(line):
-            bad.append(_BadLine(number, line, "it is no complete frame"))
+            bad.append(_BadLine(number, line, "is no complete frame"))
 
 
 def _no_log_error(

@@ -17,6 +17,8 @@ from engine.recordings.can_database import (
 )
 from engine.recordings.can_log import CanFrame, CanLog, FrameKey, read_can_log
 from engine.recordings.recording_file import (
+    NO_VALUE,
+    Assumption,
     RecordedFile,
     Samples,
     exact_fraction,
@@ -43,8 +45,8 @@ def read_can(path: Path, mapping: RecordingMap) -> RecordedFile:
     if not mapping.databases:
         label = f"map `{mapping.name}` names no DBC, which a log of CAN frames needs"
         raise SpecError([Problem("missing", mapping.span, label, "`dbc: vehicle.dbc` in the map")])
-    messages, notes = read_databases(mapping, cantools)
-    return decode_can(source, messages, read_can_log(path, source, can), tuple(notes))
+    messages, assumed = read_databases(mapping, cantools)
+    return decode_can(source, messages, read_can_log(path, source, can), tuple(assumed))
 
 
 def import_can(what: str) -> tuple[Any, Any]:
@@ -60,7 +62,7 @@ def import_can(what: str) -> tuple[Any, Any]:
 
 
 def decode_can(
-    source: Source, messages: list[Any], log: CanLog, notes: tuple[str, ...] = ()
+    source: Source, messages: list[Any], log: CanLog, assumed: tuple[Assumption, ...] = ()
 ) -> RecordedFile:
     """Return a log as a recorded file of the signals whose messages occur in it.
 
@@ -68,9 +70,10 @@ def decode_can(
     and `message.signal`. If a message is on several buses, there is `bus.message.signal`, too, and
     for several sources of a parameter group `0x18f00400.message.signal`. A name that stands for
     several signals occurs once for each of them and cannot be read. A signal is decoded when it is
-    read. `Samples.notes` tell frames that are left out; reading raises SpecError if these are all.
+    read. `Samples.assumptions` tell frames that are left out; reading raises SpecError if these
+    are all.
     """
-    return _DecodedLog(source, messages, log).to_recorded_file(notes)
+    return _DecodedLog(source, messages, log).to_recorded_file(assumed)
 
 
 class _Place(NamedTuple):
@@ -121,7 +124,7 @@ class _DecodedLog:
             if key.is_extended and parameter_group(key.identifier) == group
         ]
 
-    def to_recorded_file(self, notes: tuple[str, ...]) -> RecordedFile:
+    def to_recorded_file(self, assumed: tuple[Assumption, ...]) -> RecordedFile:
         """Return the log as a recorded file."""
         names = [name for name, places in self.places.items() for _ in places]
         count = sum(map(len, self.log.frames.values()))
@@ -134,7 +137,7 @@ class _DecodedLog:
             True,
             explain_missing=self.explain_missing,
             explain_ambiguous=self.explain_ambiguous,
-            notes=(*notes, *self.log.notes),
+            assumptions=(*assumed, *self.log.assumptions),
         )
 
     def explain_missing(self, name: str) -> str:
@@ -194,57 +197,62 @@ class _DecodedLog:
         """
         (place,) = self.places[name]
         signal, frames = place.signal, self.log.frames[place.key]
-        notes = self._notes_of(place)
+        assumed = self._assumptions_of(place)
         whole = [frame for frame in frames if len(frame.data) >= signal.length]
         if len(whole) < len(frames):
-            notes.append(self._explain_short(signal, frames))
+            assumed.append(_explain_short(signal, frames))
         if not whole:
-            label = f"message `{signal.message.name}` has no whole frame: {notes[-1]}"
+            label = f"message `{signal.message.name}` has no whole frame: {assumed[-1].reason}"
             raise SpecError([Problem("empty", Span(self.source, frames[0].line, 1), label)])
         if signal.selector is not None:
-            notes += _unknown_selections(signal, whole)
+            assumed += _unknown_selections(signal, whole)
         used = [frame for frame in whole if signal.is_selected(frame.data)]
-        words = [signal.missing_word(frame.data) for frame in used]
+        words = [signal.word(frame.data) for frame in used]
         values: list[float | None] = [
-            None if word else signal.decode(frame.data)
+            None if NO_VALUE.fullmatch(word) else signal.decode(frame.data)
             for word, frame in zip(words, used, strict=True)
         ]
-        for word, number in Counter(filter(None, words)).items():
-            notes.append(f"no value: {number} of {len(used)} samples, which the DBC calls `{word}`")
+        for word, number in Counter(filter(NO_VALUE.fullmatch, words)).items():
+            value = f"{number} of {len(used)} samples have no value"
+            reason = f"the DBC calls them `{word}`"
+            assumed.append(Assumption(f"signal `{signal.signal.name}`", value, reason))
         return Samples(
             values,
             lambda k: words[k] or repr(values[k]),
             lambda k: Span(self.source, used[k].line, 1),
             [exact_fraction(frame.time) for frame in used],
             signal.signal.unit or "",
-            tuple(notes),
+            words if any(words) else (),
+            tuple(assumed),
         )
 
-    def _notes_of(self, place: _Place) -> list[str]:
-        """Return notes on the definition of a signal and on how its message was found."""
+    def _assumptions_of(self, place: _Place) -> list[Assumption]:
+        """Return what is assumed of the definition of a signal and of its message."""
         message = place.signal.message
-        notes = []
+        assumed = []
         if place.by_group:
-            group = parameter_group(message.frame_id)
-            notes.append(
-                f"message `{message.name}` was found by its parameter group (PGN {group}): "
-                f"the log has it as {place.key.identifier:#x}, the DBC as {message.frame_id:#x}"
-            )
+            reason = f"it has the same parameter group (PGN {parameter_group(message.frame_id)}) "
+            reason += f"as {message.frame_id:#x} in the DBC"
+            value = f"{place.key.identifier:#x}"
+            assumed.append(Assumption(f"message `{message.name}`", value, reason))
         overlapping = place.signal.overlapping
         if overlapping:
-            others = _join(f"`{name}`" for name in overlapping)
-            notes.append(f"the DBC lets it overlap with {others} in message `{message.name}`")
-        return notes
+            others = _join([f"`{name}`" for name in overlapping])
+            reason = f"the DBC lets it overlap with {others} in message `{message.name}`"
+            subject = f"signal `{place.signal.signal.name}`"
+            assumed.append(Assumption(subject, "read as the DBC states", reason))
+        return assumed
 
-    @staticmethod
-    def _explain_short(signal: CanSignal, frames: list[CanFrame]) -> str:
-        """Return a note on the frames that are shorter than a signal and its message need."""
-        short = [frame for frame in frames if len(frame.data) < signal.length]
-        first = short[0]
-        return (
-            f"left out: {len(short)} of {len(frames)} frames of message `{signal.message.name}`; "
-            f"the one at {first.time!r} s has {len(first.data)} bytes, the DBC says {signal.length}"
-        )
+
+def _explain_short(signal: CanSignal, frames: list[CanFrame]) -> Assumption:
+    """Return that the frames are left out that are shorter than a signal and its message need."""
+    short = [frame for frame in frames if len(frame.data) < signal.length]
+    first = short[0]
+    return Assumption(
+        f"frames of message `{signal.message.name}`",
+        f"{len(short)} of {len(frames)} left out",
+        f"the one at {first.time!r} s has {len(first.data)} bytes, the DBC says {signal.length}",
+    )
 
 
 def _count_differing_digits(first: int, second: int) -> int:
@@ -252,23 +260,22 @@ def _count_differing_digits(first: int, second: int) -> int:
     return sum(a != b for a, b in zip(f"{first:06x}", f"{second:06x}", strict=True))
 
 
-def _unknown_selections(signal: CanSignal, frames: list[CanFrame]) -> list[str]:
-    """Return a note on frames whose multiplexer values no signal of the message has, if any."""
-    notes = []
+def _unknown_selections(signal: CanSignal, frames: list[CanFrame]) -> list[Assumption]:
+    """Return that frames are left out whose multiplexer values no signal of the message has."""
+    assumed = []
     selector = signal.selector
     while selector is not None:
         chosen = [frame for frame in frames if selector.is_selected(frame.data)]
         found = Counter(unknown_selection(signal.message, selector, f.data) for f in chosen)
         found.pop(None, None)
         if found:
-            values = _join(str(value) for value in sorted(found, key=lambda value: value or 0))
-            notes.append(
-                f"left out: {found.total()} of {len(frames)} frames of message "
-                f"`{signal.message.name}`, because the DBC does not know the value {values} of its "
-                f"multiplexer `{selector.signal.name}`"
-            )
+            values = _join([str(value) for value in sorted(found, key=lambda value: value or 0)])
+            reason = f"the DBC does not know the value {values} of the multiplexer "
+            reason += f"`{selector.signal.name}`"
+            value = f"{found.total()} of {len(frames)} left out"
+            assumed.append(Assumption(f"frames of message `{signal.message.name}`", value, reason))
         selector = selector.selector
-    return notes
+    return assumed
 
 
 def _join(names: Iterator[str] | list[str]) -> str:

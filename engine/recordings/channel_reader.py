@@ -15,16 +15,30 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from engine.recordings.csv_reader import DECIMAL
-from engine.recordings.recording_file import MAX_PROBLEMS, Note, RecordedFile, Samples
-from language.expressions.units import Unit, UnitError, are_compatible, parse_unit
+from engine.recordings.recording_file import MAX_PROBLEMS, Assumption, RecordedFile, Samples
+from engine.recordings.text_dialect import DECIMAL
+from engine.recordings.time_stamp import (
+    MIDNIGHT_STEP,
+    SECONDS_OF_DAY,
+    CalendarFormat,
+    StampError,
+    calendar_format,
+    describe_calendar,
+    explain_time_text,
+    parse_calendar_stamp,
+)
+from language.expressions.unit_spellings import UNIT_EQUIVALENTS, normalise_unit_text, unit_meanings
+from language.expressions.units import SECOND, Unit, are_compatible
 from language.model.system import ColumnMapping, RecordingMap
 from language.text.diagnostic import Problems, Span, suggest_name
+from language.typecheck.types import MAX_INT, EnumType
 
 MAX_STAMP_LENGTH = 40
 """Largest number of characters of a time stamp."""
 TIME_LIMIT = 10**12
-"""Bound on the magnitude of time stamps, in their unit."""
+"""Bound on the magnitude of time stamps [s]."""
+EPOCH_RANGE = (10**9, 4 * 10**9)
+"""Range of epochs [s], from the year 2001 to 2096, in which a better unit is proposed."""
 STAMP_PATTERN = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)"
 """Pattern of a decimal number without an exponent."""
 STAMP_LINES = re.compile(rf"(?:{STAMP_PATTERN}\n)*+{STAMP_PATTERN}", re.ASCII)
@@ -35,14 +49,13 @@ STAMP_CACHE_SIZE = 2**16
 """Number of cached time stamps; recordings of one logger often share their stamps."""
 POWERS_OF_TEN = [10**k for k in range(MAX_STAMP_LENGTH + 1)]
 """10**k by index k."""
-LOGGER_UNITS = {
-    "Nm": "N*m", "1/min": "rpm", "U/min": "rpm", "r/min": "rpm", "kph": "km/h", "m/s2": "m/s^2",
-    "\N{DEGREE SIGN}C": "degC", "\N{DEGREE SIGN}": "deg",
-}  # fmt: skip
-"""Units as loggers and DBC files write them."""
-
-UNSTATED = ("", "-", "--")
-"""Texts of a file that states no unit."""
+DISCRETE_TOLERANCE = 1e-6
+"""Largest distance of a value from a whole number that stands for it; scales leave roundings."""
+TRUTH_WORDS = {
+    **dict.fromkeys(("true", "on", "yes"), 1.0),
+    **dict.fromkeys(("false", "off", "no"), 0.0),
+}
+"""Numbers of words for truth values, in lower case."""
 
 
 def require_names(
@@ -80,7 +93,7 @@ class ChannelReader:
         self.file = file
         self.mapping = mapping
         self.problems = problems
-        self.notes: list[Note] = []
+        self.assumptions: list[Assumption] = []
         self.clock = [] if file.is_stamped else self.times(mapping.time)
 
     @cached_property
@@ -100,16 +113,23 @@ class ChannelReader:
     def times(self, name: str) -> list[Fraction | None]:
         """Return the exact time stamps of a column [s]; None for a blank or invalid cell.
 
-        A stamp is invalid if it is no decimal number, longer than `MAX_STAMP_LENGTH` or not below
-        `TIME_LIMIT` in its unit. Invalid stamps are reported, and stamps that are not above the
-        last valid one (these are kept). Blank cells are reported in the main time column only.
-        Reading stops after `MAX_PROBLEMS` problems; the list is then shorter than the column.
+        A stamp is a decimal number in the unit of the map, a date or a time of day; all stamps of a
+        column have the form of the first. A number is invalid if it is longer than
+        `MAX_STAMP_LENGTH` or not below `TIME_LIMIT`. Invalid stamps are reported, and stamps that
+        are not above the last valid one (these are kept). Blank cells are reported in the main time
+        column only. Reading stops after `MAX_PROBLEMS` problems; the list is then shorter than the
+        column.
         """
         samples = self.file.read(name)
         factor = self.mapping.time_unit.factor
-        stamps = None if self.has_max_problems else _parse_plain_stamps(samples)
+        stamps = None if self.has_max_problems else _parse_plain_stamps(samples, factor)
         if stamps is not None:
+            self._check_time_unit(name, samples.unit)
             return [value * factor for value in stamps] if factor != 1 else [*stamps]
+        form = self._calendar_format(samples)
+        if form is not None:
+            return self._calendar_times(name, samples, form)
+        self._check_time_unit(name, samples.unit)
         result: list[Fraction | None] = []
         last: Fraction | None = None
         rounded = -math.inf
@@ -117,19 +137,109 @@ class ChannelReader:
             if self.has_max_problems:
                 break
             text = samples.text(k)
-            value = _parse_stamp(text)
+            value = _parse_stamp(text, factor)
+            number = samples.values[k]
+            if number is not None and math.isnan(number):
+                value = None
             if value is not None:
                 value = value * factor if factor != 1 else value
-            elif name == self.mapping.time or text:
-                label = _explain_stamp(text) if text else "no time stamp"
-                self.problems.error("time", samples.place(k), label)
+            elif name == self.mapping.time or (text and number is not None):
+                label, help = self._explain_stamp(text)
+                self.problems.error("time", samples.place(k), label, help)
             if value is not None:
-                number = samples.values[k] or 0.0
+                number = number or 0.0
                 if last is not None and number <= rounded and value <= last:
                     self._report_unsorted(text, last, samples.place(k))
                 last, rounded = value, number
             result.append(value)
         return result
+
+    def _calendar_format(self, samples: Samples) -> CalendarFormat | None:
+        """Return the format of dates or times of day; None for numbers and unknown texts.
+
+        Dates with two meanings are reported.
+        """
+        texts = [samples.text(k) for k, value in enumerate(samples.values) if value is not None]
+        try:
+            return calendar_format(texts, self.mapping.date_order)
+        except StampError as error:
+            first = next(k for k, value in enumerate(samples.values) if value is not None)
+            self.problems.error("time", samples.place(first), str(error), error.help)
+        self.problems.raise_if_errors()
+        return None
+
+    def _calendar_times(
+        self, name: str, samples: Samples, form: CalendarFormat
+    ) -> list[Fraction | None]:
+        """Return the times [s] of dates or times of day; None for a blank or invalid cell.
+
+        A time of day that steps back by half a day or more has passed midnight. Reported are
+        stamps of another form, a time zone in some of the stamps only, and stamps that do not
+        increase.
+        """
+        result: list[Fraction | None] = []
+        last: Fraction | None = None
+        days, with_zone = 0, None
+        for k in range(len(samples.values)):
+            if self.has_max_problems:
+                break
+            text = samples.text(k)
+            parsed = parse_calendar_stamp(text, form)
+            if parsed is None:
+                result.append(None)
+                is_blank = samples.values[k] is None
+                if name == self.mapping.time or not is_blank:
+                    label, help = self._explain_stamp(text)
+                    if not is_blank:
+                        label = f"the time stamp `{text[:MAX_STAMP_LENGTH]}` is not like the first"
+                        help = f"the first one has {describe_calendar(form)}"
+                    self.problems.error("time", samples.place(k), label, help)
+                continue
+            value, has_zone = parsed
+            if with_zone is not None and has_zone != with_zone:
+                label = "some time stamps of the column have a time zone, others do not"
+                self.problems.error("time", samples.place(k), label)
+                break
+            with_zone = has_zone
+            value += days * SECONDS_OF_DAY
+            if form.kind == "clock" and last is not None and last - value >= MIDNIGHT_STEP:
+                days, value = days + 1, value + SECONDS_OF_DAY
+            if last is not None and value <= last:
+                self._report_unsorted(text, last, samples.place(k))
+            last = value
+            result.append(value)
+        self._note_calendar(name, form, days, bool(with_zone))
+        return result
+
+    def _note_calendar(self, name: str, form: CalendarFormat, days: int, has_zone: bool) -> None:
+        """Note the format of dates or times of day in a time column."""
+        reason = form.evidence or "the form of the stamps"
+        if form.kind != "clock" and not has_zone:
+            reason += "; without a time zone, taken as UTC"
+        if days:
+            reason += f"; midnight is passed {days} times" if days > 1 else "; midnight is passed"
+        value = describe_calendar(form)
+        self.assumptions.append(Assumption(f"time column `{name}`", value, reason))
+
+    def _check_time_unit(self, name: str, written: str) -> None:
+        """Report a unit of the file that is not the unit of time of the map."""
+        text, unit = written.strip(), self.mapping.time_unit
+        meanings = unit_meanings(text)
+        if not text or any(_is_same_unit(meaning, unit) for meaning in meanings):
+            return
+        times = [meaning.text for meaning in meanings if are_compatible(meaning.dimension, SECOND)]
+        label = f"the file gives the time `{name}` in `{text}`, the map in `{unit.text}`"
+        help = f"`unit: {times[0]}` in `time` of the map" if times else "it is no unit of time"
+        self.problems.error("unit", self.file.header_span, label, help)
+
+    def _explain_stamp(self, text: str) -> tuple[str, str]:
+        """Return why a text is no time stamp, and what helps."""
+        if not text:
+            return "no time stamp", ""
+        help = explain_time_text(text)
+        if DECIMAL.fullmatch(text) and len(text) <= MAX_STAMP_LENGTH:
+            help = _propose_epoch_unit(Fraction(text), self.mapping.time_unit)
+        return _explain_stamp(text), help
 
     def _report_unsorted(self, text: str, last: Fraction, place: Span) -> None:
         """Report a time stamp that is not above the previous one."""
@@ -165,7 +275,7 @@ class ChannelReader:
         the map refuses them, another unit in the file, and a column without values.
         """
         parts = [self.file.read(name) for name in column.columns]
-        self.notes += [Note(column.name, text) for part in parts for text in part.notes]
+        self.assumptions += [item for part in parts for item in part.assumptions]
         if self.file.is_stamped:
             stamps = self._own_stamps(column, parts)
         else:
@@ -178,7 +288,9 @@ class ChannelReader:
         values_si: list[float] = []
         scale = float(column.scale[0]) * column.sign
         means = cells[0] if len(cells) == 1 else _row_means(cells)
-        if stamps is self.clock and len(self.shared_times) == len(means) > 0 and not column.delay:
+        is_discrete = column.signal_type is not None and column.to is not None
+        is_plain = not column.delay and not is_discrete
+        if stamps is self.clock and len(self.shared_times) == len(means) > 0 and is_plain:
             values = _scale_all(means, scale)
             if values is not None:
                 return self.shared_times, tuple(values)
@@ -191,6 +303,8 @@ class ChannelReader:
                     self.problems.error("time", parts[0].place(k), label)
                 continue
             value = mean * scale
+            if is_discrete and math.isfinite(value):
+                value = self._to_discrete(column, value, parts[0].place(k))
             if not math.isfinite(value):
                 place = parts[0].place(k)
                 self.problems.error("value", place, f"`{column.name}` is {value} in SI")
@@ -208,55 +322,137 @@ class ChannelReader:
         """
         factor, offset = float(column.unit.factor), float(column.unit.offset)
         self._check_unit(name, samples.unit, column)
-        scaled = None if self.has_max_problems else _scale_all(samples.values, factor, offset)
+        values = self._numbers_of_words(samples, column)
+        scaled = None if self.has_max_problems else _scale_all(values, factor, offset)
         if scaled is not None:
             return [*scaled]
         result: list[float | None] = []
-        for k, value in enumerate(samples.values):
+        for k, value in enumerate(values):
             if self.has_max_problems:
                 break
             if value is not None and not math.isfinite(value):
-                label = f"`{samples.text(k)}` in {self.file.noun} `{name}` is not a finite number"
-                self.problems.error("value", samples.place(k), label)
-                value = None
+                value = self._number_of_word(samples.text(k), column)
+                if value is None:
+                    label, help = self._explain_value(name, samples.text(k), column)
+                    self.problems.error("value", samples.place(k), label, help)
             elif value is None and column.blank == "refuse":
                 label = f"{self.file.noun} `{name}` has no value here"
                 hint = "`blank: skip` in the map leaves empty cells out"
+                if samples.text(k):
+                    label += f": `{samples.text(k)}`"
                 self.problems.error("value", samples.place(k), label, hint)
             result.append(None if value is None else value * factor + offset)
         return result
 
-    def _check_unit(self, name: str, written: str, column: ColumnMapping) -> None:
-        """Report a unit of the file that is unknown or differs from the unit of the map.
+    def _numbers_of_words(self, samples: Samples, column: ColumnMapping) -> Sequence[float | None]:
+        """Return the values, or the numbers in the map's signal of the words of the file.
 
-        Units in `UNSTATED` and the unit that the map accepts (`file_unit`) are not reported.
+        The words count if the signal knows one of them; a word that it does not know is then NaN.
         """
-        written = written.strip()
-        if written in (*UNSTATED, column.file_unit.strip()):
+        numbers = [self._number_of_word(word, column) for word in samples.words]
+        if not any(number is not None for number in numbers):
+            return samples.values
+        return [
+            number if number is not None else math.nan if word and value is not None else value
+            for number, word, value in zip(numbers, samples.words, samples.values, strict=True)
+        ]
+
+    def _number_of_word(self, text: str, column: ColumnMapping) -> float | None:
+        """Return the number of a truth word or of a name of an enumeration; None for others."""
+        kind = column.signal_type
+        if kind == "truth":
+            return TRUTH_WORDS.get(text.casefold())
+        if not isinstance(kind, EnumType):
+            return None
+        if text in kind.values:
+            return float(kind.values.index(text))
+        alike = [k for k, v in enumerate(kind.values) if v.casefold() == text.casefold()]
+        return float(alike[0]) if len(alike) == 1 else None
+
+    def _explain_value(self, name: str, text: str, column: ColumnMapping) -> tuple[str, str]:
+        """Return why a cell is no value of a column, and what helps."""
+        kind = column.signal_type
+        if kind == "truth":
+            return f"`{text}` in {self.file.noun} `{name}` is no truth value", "TRUE, FALSE, 1 or 0"
+        if isinstance(kind, EnumType):
+            label = f"`{text}` in {self.file.noun} `{name}` is no value of the enumeration"
+            return label, f"its values are {', '.join(filter(None, kind.values))}"
+        help = ""
+        if re.fullmatch(r"[+-]?\d{1,3}(,\d{3})+(\.\d*)?", text):
+            help = "a number has no signs of thousands"
+        elif DECIMAL.fullmatch(text) and "." in text:
+            help = "the decimal sign of this file is the comma"
+        return f"`{text}` in {self.file.noun} `{name}` is not a finite number", help
+
+    def _to_discrete(self, column: ColumnMapping, value: float, place: Span) -> float:
+        """Return a value of a bool, int or enum input as a whole number.
+
+        A value that is none is reported: it is not rounded to one. A whole number outside the range
+        of its signal stays: the range of the input holds it, and a fault bit tells it.
+        """
+        kind = column.signal_type
+        number = round(value)
+        is_whole = abs(value - number) <= DISCRETE_TOLERANCE and abs(number) <= MAX_INT
+        if kind == "truth" and not (is_whole and number in (0, 1)):
+            label, help = f"`{column.name}` is {value:.9g}: no truth value", "TRUE, FALSE, 1 or 0"
+        elif not is_whole:
+            label = f"`{column.name}` is {value:.9g}: no whole number"
+            help = "its signal is a whole number"
+            if isinstance(kind, EnumType):
+                help = "the names or the numbers of " + ", ".join(kind.values)
+        else:
+            return float(number)
+        self.problems.error("value", place, label, help)
+        return value
+
+    def _check_unit(self, name: str, written: str, column: ColumnMapping) -> None:
+        """Report a unit of the file that is not understood or differs from the unit of the map.
+
+        A text that the map states as `file_unit` is accepted.
+        """
+        text = written.strip()
+        if not text or text == column.file_unit.strip():
             return
-        unit = file_unit(written)
-        accept = f"`file_unit: '{written}'` in the map takes it as `{column.unit.text}`"
-        if unit is None:
-            label = f"the file gives `{name}` in `{written}`, which is no known unit"
-            self.problems.error("unit", column.span, label, accept)
+        meanings = unit_meanings(text)
+        if any(_is_same_unit(meaning, column.unit) for meaning in meanings):
             return
-        text = unit.text
-        same = are_compatible(unit.dimension, column.unit.dimension)
-        if not same or (unit.factor, unit.offset) != (column.unit.factor, column.unit.offset):
-            label = f"the file gives `{name}` in `{text}`, the map in `{column.unit.text}`"
-            hint = f"`unit: {text}` in the map; {accept}"
-            self.problems.error("unit", column.span, label, hint)
+        accepted = f'`file_unit: "{text}"` in the map if `unit` is right'
+        if not meanings:
+            label = f"the unit `{text}` of `{name}` in the file is not understood"
+            help = accepted
+            equivalent = UNIT_EQUIVALENTS.get(normalise_unit_text(text))
+            if equivalent:
+                factor, unit = equivalent
+                help = f'`unit: {unit}, scale: {factor}, file_unit: "{text}"` in the map'
+            self.problems.error("unit", column.span, label, help)
+            return
+        shown = meanings[0].text
+        label = f"the file gives `{name}` in `{shown}`, the map in `{column.unit.text}`"
+        help = f"`unit: {shown}` in the map"
+        if shown != text:
+            label = f"the file gives `{name}` in `{text}` ({shown}), the map in "
+            label += f"`{column.unit.text}`"
+        self.problems.error("unit", column.span, label, help)
 
 
 def file_unit(written: str) -> Unit | None:
-    """Return the unit that a logger or a DBC file writes; None if it is unknown.
+    """Return the usual meaning of a unit that a file states; None if it is not understood."""
+    return next(iter(unit_meanings(written)), None)
 
-    `LOGGER_UNITS` translates special spellings; other texts are units of modewright.
-    """
-    try:
-        return parse_unit(LOGGER_UNITS.get(written, written))
-    except UnitError:
-        return None
+
+def _is_same_unit(first: Unit, second: Unit) -> bool:
+    """Return whether two units have the same dimension, factor and offset."""
+    same = (first.factor, first.offset) == (second.factor, second.offset)
+    return same and are_compatible(first.dimension, second.dimension)
+
+
+def _propose_epoch_unit(value: Fraction, unit: Unit) -> str:
+    """Return the unit in which a large stamp is an epoch of this century; empty if none is."""
+    names = ("s", "ms", "us", "ns")
+    for exponent, name in enumerate(names):
+        if EPOCH_RANGE[0] <= value / 1000**exponent <= EPOCH_RANGE[1] and name != unit.text:
+            return f"it is an epoch of this century in {name}: `unit: {name}` in `time` of the map"
+    return ""
 
 
 def _scale_all(
@@ -283,11 +479,11 @@ def _row_means(columns: Sequence[Sequence[float | None]]) -> list[float | None]:
     return means
 
 
-def _parse_plain_stamps(samples: Samples) -> list[Fraction] | None:
+def _parse_plain_stamps(samples: Samples, factor: Fraction) -> list[Fraction] | None:
     """Return increasing time stamps without exponents in one pass.
 
-    The result is None if some stamp is blank, has an exponent, is not above its predecessor or is
-    out of range.
+    `factor` is their unit [s]. The result is None if some stamp is blank, has an exponent, is not
+    above its predecessor or is out of range.
     """
     numbers = [value for value in samples.values if value is not None]
     is_growing = all(after > before for before, after in itertools.pairwise(numbers))
@@ -297,7 +493,7 @@ def _parse_plain_stamps(samples: Samples) -> list[Fraction] | None:
     if not STAMP_LINES.fullmatch("\n".join(texts)) or max(map(len, texts)) > MAX_STAMP_LENGTH:
         return None
     stamps = [_parse_plain_stamp(text) for text in texts]
-    return stamps if max(-stamps[0], stamps[-1]) < TIME_LIMIT else None
+    return stamps if max(-stamps[0], stamps[-1]) * factor < TIME_LIMIT else None
 
 
 @lru_cache(STAMP_CACHE_SIZE)
@@ -307,14 +503,17 @@ def _parse_plain_stamp(text: str) -> Fraction:
     return Fraction(int(whole + part), POWERS_OF_TEN[len(part)])
 
 
-def _parse_stamp(text: str) -> Fraction | None:
-    """Return a decimal number exactly; None if it is no number, too long or beyond `TIME_LIMIT`."""
+def _parse_stamp(text: str, factor: Fraction) -> Fraction | None:
+    """Return a decimal number exactly; None if it is no number, too long or beyond `TIME_LIMIT`.
+
+    `factor` is the unit of the stamp [s].
+    """
     if len(text) > MAX_STAMP_LENGTH or not DECIMAL.fullmatch(text):
         return None
     whole, _, part = text.partition(".")
     is_plain = "e" not in text and "E" not in text
     value = Fraction(int(whole + part), 10 ** len(part)) if is_plain else Fraction(text)
-    return value if abs(value.numerator) < TIME_LIMIT * value.denominator else None
+    return value if abs(value * factor) < TIME_LIMIT else None
 
 
 def _explain_stamp(text: str) -> str:
@@ -327,4 +526,4 @@ def _explain_stamp(text: str) -> str:
         return f"{label} is not a number"
     if len(text) > MAX_STAMP_LENGTH:
         return f"{label} has more than {MAX_STAMP_LENGTH} characters"
-    return f"{label} is too large: its magnitude must be below {TIME_LIMIT:.0e}"
+    return f"{label} is too large: its magnitude must be below {TIME_LIMIT:.0e} s"

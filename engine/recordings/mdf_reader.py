@@ -21,9 +21,9 @@ import numpy as np
 from engine.recordings.can_database import read_databases
 from engine.recordings.can_log import CanFrame, CanLog, FrameKey, remove_repeated_frames
 from engine.recordings.can_reader import decode_can, import_can
-from engine.recordings.csv_reader import DECIMAL
 from engine.recordings.recording_file import (
     NO_VALUE,
+    Assumption,
     RecordedFile,
     Samples,
     exact_fraction,
@@ -31,6 +31,7 @@ from engine.recordings.recording_file import (
     require_size,
     unreadable_error,
 )
+from engine.recordings.text_dialect import DECIMAL
 from language.model.system import RecordingMap
 from language.overlays.expand_document import display_path
 from language.text.diagnostic import MissingToolError, Problem, Source, Span, SpecError
@@ -181,8 +182,8 @@ class _MdfFile:
         if CAN_FRAMES not in self.places or not self.mapping.databases:
             return file
         _, cantools = import_can("an MF4 file with frames of a CAN bus")
-        messages, notes = read_databases(self.mapping, cantools)
-        bus = decode_can(self.source, messages, self._read_frames(), tuple(notes))
+        messages, assumed = read_databases(self.mapping, cantools)
+        bus = decode_can(self.source, messages, self._read_frames(), tuple(assumed))
         signals = set(bus.names)
         channels = [
             name for name in file.names if not name.startswith(CAN_CHANNELS) and name not in signals
@@ -198,7 +199,7 @@ class _MdfFile:
             explain_ambiguous=lambda name: (
                 bus.explain_ambiguous(name) if name in signals else file.explain_ambiguous(name)
             ),
-            notes=bus.notes,
+            assumptions=bus.assumptions,
         )
 
     def _read_frames(self) -> CanLog:
@@ -225,11 +226,11 @@ class _MdfFile:
                 count += 1
                 key = FrameKey(f"CAN{int(bus)}", number & ~EXTENDED_FLAG, bool(ide))
                 frames.setdefault(key, []).append(CanFrame(time, row[:length], count))
-        notes: list[str] = []
+        assumed: list[Assumption] = []
         ordered = {
             key: sorted(series, key=lambda frame: frame.time) for key, series in frames.items()
         }
-        return CanLog(remove_repeated_frames(ordered, notes), tuple(notes))
+        return CanLog(remove_repeated_frames(ordered, assumed), tuple(assumed))
 
     def _samples(self, name: str) -> Samples:
         """Return the samples of a channel; arrays are NaN.
@@ -249,7 +250,7 @@ class _MdfFile:
                 self.source, f"understood: channel `{name}`: {first_line(error)}"
             ) from None
         stamps = self._stamps(name, place, signal.timestamps)
-        notes: list[str] = []
+        assumed: list[Assumption] = []
         if values.ndim != 1 or values.dtype.names:
             texts = [str(value) for value in values]
             numbers: list[float | None] = [math.nan] * len(values)
@@ -257,7 +258,7 @@ class _MdfFile:
             numbers = [float(value) for value in values]
             texts = [repr(value) for value in numbers]
         else:
-            numbers, texts = _convert_texts(values.tolist(), raw, notes)
+            numbers, texts = _convert_texts(name, values.tolist(), raw, assumed)
         invalid = getattr(signal, "invalidation_bits", None)
         if invalid is not None:
             flags = np.asarray(invalid)
@@ -268,7 +269,8 @@ class _MdfFile:
             lambda k: Span(self.source, k + 1, 1),
             stamps,
             signal.unit or "",
-            tuple(notes),
+            () if values.dtype.kind in "biuf" or values.ndim != 1 else texts,
+            tuple(assumed),
         )
 
     def _stamps(self, name: str, place: Place, stamps: Any) -> list[Fraction]:
@@ -300,7 +302,7 @@ class _MdfFile:
 
 
 def _convert_texts(
-    values: Sequence[Any], raw: Any, notes: list[str]
+    name: str, values: Sequence[Any], raw: Any, assumed: list[Assumption]
 ) -> tuple[list[float | None], list[str]]:
     """Return the numbers and the texts of a channel of texts, or with a conversion to texts.
 
@@ -324,11 +326,13 @@ def _convert_texts(
             numbers.append(float(raw[k]) if is_enumeration or not text else math.nan)
     missing = Counter(text for text in texts if NO_VALUE.fullmatch(text))
     for word, count in missing.items():
-        notes.append(f"no value: {count} of {len(texts)} samples, which the file calls `{word}`")
+        value = f"{count} of {len(texts)} samples have no value"
+        assumed.append(Assumption(f"channel `{name}`", value, f"the file calls them `{word}`"))
     codes = {t: n for t, n in zip(texts, numbers, strict=True) if n is not None and t}
     if is_enumeration and not is_text and codes:
         listed = ", ".join(f"`{word}` is {number:g}" for word, number in list(codes.items())[:6])
-        notes.append(f"the file converts its values to words: {listed}")
+        reason = f"the file converts them to words: {listed}"
+        assumed.append(Assumption(f"values of channel `{name}`", "numbers", reason))
     return numbers, texts
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from engine.recordings.channel_reader import ChannelReader, require_names
 from engine.recordings.csv_reader import read_csv
-from engine.recordings.recording_file import Note, RecordedFile, require_regular_file
+from engine.recordings.recording_file import Assumption, RecordedFile, require_regular_file
 from engine.recordings.recording_window import strip_window_suffix, windows_in_use
 from language.model.system import ColumnMapping, RecordingMap, Window
 from language.overlays.expand_document import display_path
@@ -60,8 +60,8 @@ class Recording:
     """Channels that a map takes from a file, by their names in the map.
 
     `start` and `end` [s] are the first and last time. `windows` [s] are the times to use, in order;
-    empty means all. `place` is that of the file, for messages. `notes` tell what the reader left
-    out or assumed.
+    empty means all. `place` is that of the file, for messages. `assumptions` tell what was taken of
+    the file that neither the file nor the map states.
     """
 
     name: str
@@ -70,7 +70,7 @@ class Recording:
     start: Fraction = Fraction(0)
     windows: tuple[Window, ...] = ()
     place: Span | None = None
-    notes: tuple[Note, ...] = ()
+    assumptions: tuple[Assumption, ...] = ()
 
     def is_used(self, time: Fraction) -> bool:
         """Return whether a time [s] lies in a window, ends included; True without windows."""
@@ -139,9 +139,12 @@ def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Re
     windows = windows_in_use(path, mapping, problems)
     problems.raise_if_errors()
     place = Span(Source(display_path(strip_window_suffix(path))), 1, 1)
-    notes = [*(Note("", text) for text in file.notes), *dict.fromkeys(reader.notes)]
-    notes = [dataclasses.replace(note, text=escape_invisible(note.text)) for note in notes]
-    recording = Recording(path.name, channels, max(known), min(known), windows, place, tuple(notes))
+    recording = Recording(path.name, channels, max(known), min(known), windows, place)
+    assumed = tuple(
+        Assumption(*map(escape_invisible, (item.subject, item.value, item.reason)))
+        for item in dict.fromkeys((*file.assumptions, *reader.assumptions))
+    )
+    recording = dataclasses.replace(recording, assumptions=assumed)
     return crop_to_windows(recording, mapping)
 
 
@@ -176,7 +179,7 @@ def open_recording(path: Path, mapping: RecordingMap, problems: Problems) -> Rec
         from engine.recordings.can_reader import read_can
 
         return read_can(path, mapping)
-    return read_csv(path, problems)
+    return read_csv(path, mapping, problems)
 
 
 def _is_mdf(path: Path) -> bool:

@@ -25,11 +25,16 @@ NO_VALUE = re.compile(
 
 
 @dataclass(frozen=True)
-class Note:
-    """What a reader left out or assumed; `channel` is its name in the map, empty for the file."""
+class Assumption:
+    """What a reader has taken of a file that neither the file nor the map states.
 
-    channel: str
-    text: str
+    `subject` is for example `separator`, `value` is `semicolon`, and `reason` the evidence. It is
+    also what the reader left out, with the reason.
+    """
+
+    subject: str
+    value: str
+    reason: str
 
 
 @dataclass(frozen=True)
@@ -39,7 +44,8 @@ class Samples:
     `values` are None for an empty cell, and not finite if `text` is no finite number. `text` and
     `place` give the text and the place of a sample by index; in a binary format the row or sample
     number stands for the line. `stamps` [s] are the time stamps of the samples; None if the rows
-    share a time column. `unit` is the unit text of the file. `notes` tell what is left out.
+    share a time column. `unit` is the unit text of the file. `words` are the words of the file for
+    the numbers, empty if it has none. `assumptions` also tell what is left out.
     """
 
     values: Sequence[float | None]
@@ -47,7 +53,8 @@ class Samples:
     place: Callable[[int], Span]
     stamps: Sequence[Fraction] | None = None
     unit: str = ""
-    notes: tuple[str, ...] = ()
+    words: Sequence[str] = ()
+    assumptions: tuple[Assumption, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -56,8 +63,9 @@ class RecordedFile:
 
     `noun` is the word for these in messages. `read` returns the samples of a name. `is_stamped`
     tells whether each name has its own time stamps. `explain_missing` returns a hint for a missing
-    name, `explain_ambiguous` one for a name that occurs several times, or an empty text. `notes`
-    tell what the reader left out or assumed in the whole file.
+    name, `explain_ambiguous` one for a name that occurs several times, or an empty text.
+    `head_line` is the number of the line with the names. `assumptions` are what the reader has
+    taken of the whole file.
     """
 
     source: Source
@@ -68,13 +76,15 @@ class RecordedFile:
     is_stamped: bool = False
     explain_missing: Callable[[str], str] = lambda name: ""
     explain_ambiguous: Callable[[str], str] = lambda name: ""
-    notes: tuple[str, ...] = ()
+    head_line: int = 1
+    assumptions: tuple[Assumption, ...] = ()
 
     @property
     def header_span(self) -> Span:
-        """Place of the names: the whole first line of the file; a binary file has one character."""
+        """Place of the names: the whole head line of the file; a binary file has one character."""
         lines = self.source.lines
-        return Span(self.source, 1, 1, max(1, len(lines[0])) if lines else 1)
+        length = len(lines[self.head_line - 1]) if lines else 1
+        return Span(self.source, self.head_line, 1, max(1, length))
 
 
 def require_size(path: Path, source: Source) -> None:

@@ -21,7 +21,7 @@ from engine.recordings.recording import Channel, Recording
 from engine.results.sampled_run import Event, SignalArray
 from engine.results.trajectory import Trajectory, column_array, fault_names
 from language.expressions.units import display_unit
-from language.ir.program import Program
+from language.ir.program import Program, ValueType
 from language.ir.root_region import CHART
 from language.loading.recording_map_columns import pair_columns
 from language.model.automaton import Automaton
@@ -172,7 +172,7 @@ class _ChannelCursor:
         kinds = {variable.name: variable.type for variable in program.variables}
         flag = f"is_new.{channel.column.to}"
         self.flag = flag if flag in kinds else None
-        self.truth = kinds[self.target] == "truth"
+        self.kind = kinds[self.target]
 
     def advance(self, time: Fraction, stepper: Stepper) -> None:
         """Set the input to the latest value with a stamp up to `time` [s].
@@ -185,21 +185,29 @@ class _ChannelCursor:
         is_new = position > self.position
         if is_new:
             value = self.channel.values[position - 1]
-            stepper.set(self.target, value != 0.0 if self.truth else value)
+            stepper.set(self.target, _to_type(value, self.kind))
         self.position = position
         if self.flag:
             stepper.set(self.flag, is_new)
+
+
+def _to_type(value: float, kind: ValueType) -> float | int | bool:
+    """Return a number as a value of the type of a variable; whole numbers are rounded."""
+    if kind == "truth":
+        return value != 0.0
+    return round(value) if kind == "whole" else value
 
 
 def _set_constants(
     automaton: Automaton, program: Program, mapping: RecordingMap, stepper: Stepper
 ) -> None:
     """Set the inputs to their defaults, then to the constants of the map."""
+    kinds = {variable.name: variable.type for variable in program.variables}
     for name, value in program.defaults.items():
         stepper.set(f"input.{name}", value)
     for name, (number, _) in mapping.constants.items():
         if name in automaton.inputs:
-            stepper.set(f"input.{name}", float(number))
+            stepper.set(f"input.{name}", _to_type(float(number), kinds[f"input.{name}"]))
 
 
 class _TickRecorder:

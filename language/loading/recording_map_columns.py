@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Mapping
+
 from language.expressions.units import PURE_NUMBER, Dimension, are_compatible
 from language.loading.recording_map_reader import column_dimension
 from language.model.automaton import Automaton
 from language.model.system import ColumnMapping, RecordingMap
 from language.text.diagnostic import Problems, suggest_name
+from language.typecheck.types import EnumType, ExprType, IntType, TypeName
 
 
 def pair_columns(
@@ -74,6 +78,56 @@ def check_pairing(automaton: Automaton, mapping: RecordingMap, problems: Problem
         label = f"map `{mapping.name}` compares no output of `{automaton.name}`"
         hint = f"a column with `compare: {next(iter(automaton.outputs), 'output')}`"
         problems.error("missing", mapping.span, label, hint)
+
+
+def add_signal_types(
+    mapping: RecordingMap, input_types: Mapping[str, ExprType], output_types: Mapping[str, ExprType]
+) -> RecordingMap:
+    """Return a map whose columns know the types of their signals, for words such as `TRUE`.
+
+    Types of quantities are left out: a column of a real signal has None.
+    """
+    columns = {}
+    for name, column in mapping.columns.items():
+        types, signal = (
+            (input_types, column.to) if column.compare is None else (output_types, column.compare)
+        )
+        kind = types.get(signal or "")
+        kind = None if isinstance(kind, Dimension) else kind
+        columns[name] = dataclasses.replace(column, signal_type=kind)
+    return dataclasses.replace(mapping, columns=columns)
+
+
+def type_columns(automaton: Automaton, mapping: RecordingMap) -> RecordingMap:
+    """Return a map whose columns know the types of the inputs and outputs of an automaton.
+
+    The output `mode` is an enumeration of the modes at the positions of their numbers; numbers
+    without a mode have an empty name.
+    """
+    inputs = {
+        name: type_of_input(item.type, item.values) for name, item in automaton.inputs.items()
+    }
+    outputs = {
+        name: kind
+        for name in automaton.outputs
+        if (kind := automaton.name_types.get(automaton.output_source(name))) is not None
+    }
+    modes = {mode.number: mode.name for mode in automaton.modes.values()}
+    names = tuple(modes.get(number, "") for number in range(max(modes, default=-1) + 1))
+    for name in automaton.outputs:
+        if automaton.output_source(name) == "mode":
+            outputs.setdefault(name, EnumType(names))
+    return add_signal_types(mapping, inputs, outputs)
+
+
+def type_of_input(word: TypeName, values: tuple[str, ...]) -> ExprType:
+    """Return the type of an input from the word of its declaration; a pure number for `real`."""
+    types: dict[TypeName, ExprType] = {
+        "bool": "truth",
+        "int": IntType(),
+        "enum": EnumType(values),
+    }
+    return types.get(word, PURE_NUMBER)
 
 
 def _check_output(automaton: Automaton, column: ColumnMapping, problems: Problems) -> None:

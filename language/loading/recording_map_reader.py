@@ -15,7 +15,7 @@ from language.expressions.units import (
     dimension_product,
     parse_unit,
 )
-from language.model.system import ALL_FILES, ColumnMapping, RecordingMap, Window
+from language.model.system import ALL_FILES, ColumnMapping, RecordingMap, TextFormat, Window
 from language.overlays.expand_document import Project, expand_document
 from language.readers.base_reader import Reader
 from language.text.diagnostic import Problems, Span
@@ -29,10 +29,23 @@ from language.text.document import (
     require_kind,
 )
 
-MAP_KEYS = ("language", "map", "time", "columns", "constants", "windows", "dbc")
+MAP_KEYS = ("language", "map", "time", "columns", "constants", "windows", "dbc", "csv")
 COLUMN_KEYS = (
     "column mean to compare unit file_unit scale sign delay hold blank time".split()  # noqa: SIM905
 )
+
+CSV_KEYS = ("separator", "decimal", "encoding", "head", "units")
+SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "bar": "|"}
+"""Separators of cells by their word in a map."""
+DECIMAL_SIGNS = {"point": ".", "comma": ","}
+"""Decimal signs by their word in a map."""
+ENCODINGS = (
+    *("utf-8", "utf-16", "utf-16-le", "utf-16-be"),
+    *("cp1252", "cp1250", "latin-1", "shift-jis"),
+)
+"""Encodings of text recordings that a map can state."""
+MAX_HEAD_LINE = 10_000
+"""Largest number of the line with the names of columns."""
 
 
 def read_map(document: Document, project: Project) -> RecordingMap:
@@ -69,13 +82,14 @@ class _MapReader(Reader):
     def read(self, root: MappingNode, name: str, span: Span) -> RecordingMap:
         """Return the recording map; without `time` the unit of time is s."""
         tree = self.read_mapping(root, f"map {name}", MAP_KEYS)
-        time = self.read_mapping(tree.get("time"), "time", ("column", "unit"))
+        time = self.read_mapping(tree.get("time"), "time", ("column", "unit", "date_order"))
         has_time = "time" in tree.entries
         unit = self.read_unit(time.get("unit")) if has_time else parse_unit("s")
         if not are_compatible(unit.dimension, SECOND):
             self.problems.error(
                 "unit", time.span if time.entries else span, "the unit of `time` is a time"
             )
+        order = self.read_choice(time.get("date_order"), "date_order", ("DMY", "MDY"), "")
         constants: dict[str, tuple[Fraction, Dimension]] = {}
         for entry in self.named_entries(tree.get("constants"), "constants"):
             value, own = self.read_quantity(entry.node, entry.key, entry.span, None)
@@ -94,6 +108,30 @@ class _MapReader(Reader):
             span=span,
             windows=self._read_windows(tree.get("windows")),
             databases=self._read_databases(tree.get("dbc")),
+            text_format=self._read_text_format(tree.get("csv")),
+            date_order=order,
+        )
+
+    def _read_text_format(self, node: YamlNode | None) -> TextFormat:
+        """Return the format of text files that the map states; without `csv` all is detected."""
+        if node is None:
+            return TextFormat()
+        table = self.read_mapping(node, "csv", CSV_KEYS)
+        separator = self.read_choice(table.get("separator"), "separator", SEPARATORS, "")
+        decimal = self.read_choice(table.get("decimal"), "decimal", DECIMAL_SIGNS, "")
+        head, units = (
+            self.read_integer(table.get(key), f"csv.{key}", 0, 1, MAX_HEAD_LINE)
+            for key in ("head", "units")
+        )
+        if units and units <= head:
+            label = "the line of units stands below the head line"
+            self.problems.error("range", node.span, label)
+        return TextFormat(
+            separator=SEPARATORS.get(separator, ""),
+            decimal=DECIMAL_SIGNS.get(decimal, ""),
+            encoding=self.read_choice(table.get("encoding"), "encoding", ENCODINGS, ""),
+            head=head,
+            units=units,
         )
 
     def _read_databases(self, node: YamlNode | None) -> tuple[ScalarNode, ...]:

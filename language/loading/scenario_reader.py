@@ -11,6 +11,7 @@ from language.expressions.constant_literal import evaluate_literal
 from language.expressions.syntax_tree import FunctionCall, Name, SyntaxTree
 from language.expressions.units import Dimension, Unit, are_compatible
 from language.loading.calibration_page_reader import read_pages
+from language.loading.recording_map_columns import add_signal_types, type_of_input
 from language.loading.recording_map_reader import MAP_KEYS, column_dimension, read_map_table
 from language.loading.stimulus_reader import StimulusReader
 from language.model.system import (
@@ -154,7 +155,11 @@ class _ScenarioReader(StimulusReader):
         with self.problems.collect_errors():
             for path in paths[:1]:
                 require_inside_project(path, file.span, self.project.root)
-        return RecordingSource(paths[0] if paths else Path(file.text), mapping, file.span)
+        types = {
+            name: type_of_input(item.type, item.values) for name, item in self.system.inputs.items()
+        }
+        typed = add_signal_types(mapping, types, {})
+        return RecordingSource(paths[0] if paths else Path(file.text), typed, file.span)
 
     def _read_signals(self, items: Sequence[ScalarNode]) -> tuple[str, ...]:
         """Return the names of the signals to record; unknown and repeated names are reported."""

@@ -14,7 +14,7 @@ from language.model.automaton import Automaton
 from language.model.declaration import Formula
 from language.text.diagnostic import Span
 from language.text.document import ScalarNode
-from language.typecheck.types import TypeName
+from language.typecheck.types import ExprType, TypeName
 
 
 @dataclass(frozen=True)
@@ -216,7 +216,8 @@ class ColumnMapping:
     Of several `columns` the mean is used. The signal is the input `to`, or it is compared with the
     output `compare`. `delay` is in s. `time` names a time column of its own. Without `hold` a value
     is kept until the next one; a diagnosis may then choose (`diagnosis.selection.intersample`).
-    `unit` holds although the file states `file_unit`.
+    `unit` holds although the file states `file_unit`. `signal_type` is the type of the signal if it
+    is a truth value, a whole number or an enumeration, and None for a real or unknown signal.
     """
 
     name: str
@@ -232,6 +233,21 @@ class ColumnMapping:
     span: Span
     hold: Literal["previous", "linear"] | None = None
     file_unit: str = ""
+    signal_type: ExprType | None = None
+
+
+@dataclass(frozen=True)
+class TextFormat:
+    """The format of a text recording as a map states it; what is empty or 0 is detected.
+
+    `head` is the number of the line with the names of the columns, `units` that of their units.
+    """
+
+    separator: str = ""
+    decimal: str = ""
+    encoding: str = ""
+    head: int = 0
+    units: int = 0
 
 
 Window = tuple[Fraction, Fraction]
@@ -247,7 +263,8 @@ class RecordingMap:
 
     `windows` are the time intervals to use, by file name or `ALL_FILES`; without any, the whole
     recording is used. `time` is empty if the files carry time stamps themselves. `databases` are
-    the names of DBC files.
+    the names of DBC files. `date_order` is the order of dates in the time columns (`DMY`, `MDY`);
+    empty if it follows from the dates.
     """
 
     name: str
@@ -258,6 +275,8 @@ class RecordingMap:
     span: Span
     windows: Mapping[str, tuple[Window, ...]] = field(default_factory=dict)
     databases: tuple[ScalarNode, ...] = ()
+    text_format: TextFormat = TextFormat()
+    date_order: str = ""
 
     def windows_of(self, file: str) -> tuple[Window, ...]:
         """Return the windows of a file, by the name used in `windows`, else those for ALL_FILES.

@@ -23,7 +23,7 @@ from diagnosis.data_quality.recording_map_inference import guess_map
 from diagnosis.pipeline.diagnosis_case import Case
 from engine.recordings.recording import Recording, read_recording
 from language.loading.load import load_automaton
-from language.loading.recording_map_columns import check_pairing
+from language.loading.recording_map_columns import check_pairing, type_columns
 from language.loading.recording_map_reader import read_map
 from language.model.automaton import Automaton
 from language.model.system import RecordingMap
@@ -103,6 +103,7 @@ def check_recordings(
     mapping = read_map(read_document(project.path_of(map_name)), project) if map_name else None
     if mapping is not None:
         _check_map(automaton, mapping)
+        mapping = type_columns(automaton, mapping) if automaton else mapping
     if len({os.path.realpath(path) for path in paths}) < len(paths):
         raise ValueError("a recording is named twice: each recording counts once")
     names = distinguish_file_names(paths)

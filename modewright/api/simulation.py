@@ -20,6 +20,7 @@ from language.ir.number_type import NumberType
 from language.ir.program import Program
 from language.loading.calibration_page_reader import parse_pages
 from language.loading.load import automaton_of, program_of
+from language.loading.recording_map_columns import type_columns
 from language.loading.recording_map_reader import read_map
 from language.loading.scenario_reader import read_scenario
 from language.loading.system_reader import read_system, with_number_type
@@ -245,6 +246,7 @@ def replay(
         to_text(estimator, "estimator"), variant_name, scalars, project, names
     )
     mapping = read_map(read_document(project.path_of(map_name)), project)
+    mapping = type_columns(automaton, mapping)
     columns, left_out = used_columns(automaton, mapping)
     measured = read_recording(file, mapping, columns)
     tape = TickLog(used, name=automaton.name)

@@ -14,6 +14,7 @@ from diagnosis.data_quality.channel import ChannelCheck
 from diagnosis.data_quality.excitation import Excitation
 from diagnosis.data_quality.finding import format_findings
 from diagnosis.data_quality.recording_check import RecordingCheck
+from engine.recordings.recording_file import Assumption
 from modewright.render.run import nonfinite_to_none
 from modewright.runtime.json_format import format_entry
 
@@ -24,11 +25,14 @@ MAX_CHANNELS = 24
 
 
 def print_check(screen: Console, check: RecordingCheck) -> None:
-    """Print the table of channels, the excitation, the testable effects and the findings.
+    """Print the channels, the assumptions, the excitation, the testable effects and the findings.
 
     Effects that cannot be tested are listed with what they need. Without findings a line says so.
     """
     screen.print(channel_table(check.channels))
+    if check.assumptions:
+        screen.print()
+        screen.print(assumption_table(check.assumptions))
     _print_excitation(screen, check.excitation)
     if not check.findings:
         screen.print("\n[green]nothing odd was found in these data[/]")
@@ -61,6 +65,15 @@ def channel_table(channels: Sequence[ChannelCheck]) -> Table:
         )
     if len(channels) > MAX_CHANNELS:
         table.add_row("...", f"{len(channels) - MAX_CHANNELS} more")
+    return table
+
+
+def assumption_table(assumptions: Sequence[tuple[str, Assumption]]) -> Table:
+    """Return a table of what was assumed of each recording, and why."""
+    heads = ("recording", "assumed", "value", "reason")
+    table = Table(*heads, box=None, pad_edge=False, header_style="bold")
+    for name, item in assumptions:
+        table.add_row(*map(escape, (name, item.subject, item.value, item.reason)))
     return table
 
 
@@ -97,5 +110,6 @@ def check_json(check: RecordingCheck) -> dict[str, Any]:
         "effects": {
             e.effect: {"testable": e.is_testable, "needs": e.lacking} for e in excitation.effects
         },
+        "assumptions": [{"recording": name, **asdict(one)} for name, one in check.assumptions],
         "relations": [nonfinite_to_none(asdict(one)) for one in check.agreements],
     }

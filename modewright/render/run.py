@@ -159,9 +159,8 @@ def replay_json(replayed: Replayed) -> dict[str, Any]:
     """Return a replay as a dict for JSON.
 
     It has the keys and values of `trajectory_json`, but `format` is that of a replay
-    (`modewright-replay/...`). In addition it has innovation_rms, comparisons, columns_left_out and
-    lockstep (the verdict, None without C).
-    `notes` are what the reader of the recording left out or assumed.
+    (`modewright-replay/...`). In addition it has innovation_rms, comparisons, columns_left_out,
+    assumptions and lockstep (the verdict, None without C).
     """
     return {
         **trajectory_json(replayed.result.trajectory),
@@ -169,7 +168,7 @@ def replay_json(replayed: Replayed) -> dict[str, Any]:
         "innovation_rms": dict(replayed.result.innovation_rms),
         "comparisons": [vars(comparison) for comparison in replayed.result.comparisons],
         "columns_left_out": list(replayed.left_out),
-        "notes": [vars(note) for note in replayed.recording.notes],
+        "assumptions": [vars(item) for item in replayed.recording.assumptions],
         "lockstep": verdict_json(replayed.verdict) if replayed.verdict else None,
     }
 
@@ -177,8 +176,7 @@ def replay_json(replayed: Replayed) -> dict[str, Any]:
 def print_replay(console: Console, replayed: Replayed) -> None:
     """Print ticks, events, innovations, comparisons and the lock-step verdict of a replay.
 
-    Notes of the reader of the recording follow, and the columns of the map that were left out.
-    Without a verdict that part is missing.
+    Columns of the map that were left out are named; without a verdict that part is missing.
     """
     result = replayed.result
     times = result.trajectory.times
@@ -195,9 +193,9 @@ def print_replay(console: Console, replayed: Replayed) -> None:
     for found in result.comparisons:
         text = f"{found.output} against the recording: RMS {found.rms:.4g} {found.unit}"
         console.print(f"{text}, largest {found.largest:.4g} {found.unit}", highlight=False)
-    for note in replayed.recording.notes:
-        text = f"note: {note.channel}: {note.text}" if note.channel else f"note: {note.text}"
-        console.print(text, highlight=False, markup=False, soft_wrap=True)
+    for item in replayed.recording.assumptions:
+        text = f"assumed of the recording: {item.subject}: {item.value} ({item.reason})"
+        console.print(escape(text), highlight=False, soft_wrap=True)
     for name in replayed.left_out:
         console.print(f"`{name}` of the map is not read: there is no such input", highlight=False)
     if replayed.verdict:

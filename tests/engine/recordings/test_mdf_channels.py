@@ -40,7 +40,7 @@ def values_of(recording: Recording, name: str = "T_em") -> tuple[float, ...]:
 
 
 def notes_of(recording: Recording) -> list[str]:
-    return [note.text for note in recording.notes]
+    return [f"{item.subject}: {item.value} ({item.reason})" for item in recording.assumptions]
 
 
 class TestNames:
@@ -129,7 +129,9 @@ class TestTexts:
         path = write(tmp_path / "a.mf4", signal(np.array([1, 255, 20], "u1"), conversion=words))
         found = read(path, MAP.replace("unit: N*m", "unit: N*m, blank: skip"))
         assert values_of(found) == (1.0, 20.0)
-        assert notes_of(found) == ["no value: 1 of 3 samples, which the file calls `SNA`"]
+        assert notes_of(found) == [
+            "channel `T_em`: 1 of 3 samples have no value (the file calls them `SNA`)"
+        ]
 
     def test_a_word_among_numbers_is_no_number(self, tmp_path: Path) -> None:
         words = {"val_0": 255, "text_0": "standstill", "default": b""}
@@ -141,7 +143,10 @@ class TestTexts:
         path = write(tmp_path / "a.mf4", signal(np.array([0, 3, 0], "u1"), conversion=words))
         found = read(path, MAP.replace("N*m", "1"))
         assert values_of(found) == (0.0, 3.0, 0.0)
-        assert notes_of(found) == ["the file converts its values to words: `off` is 0, `on` is 3"]
+        assert notes_of(found) == [
+            "values of channel `T_em`: numbers "
+            "(the file converts them to words: `off` is 0, `on` is 3)"
+        ]
 
     def test_a_channel_of_texts_is_read_as_numbers(self, tmp_path: Path) -> None:
         texts = np.array([b"1.5", b"-2e1", b"SNA"])

@@ -130,7 +130,7 @@ class TestAFileThatCannotBeRead:
         assert text == "drive.csv.gz:1:1: error: the recording is empty"
 
     @pytest.mark.parametrize(
-        "data", [b"\x89PNG\r\n\x1a\n\0\0", b"t_s,a\n1,\0\n", GOOD.encode("utf-16"), b"\xb0C,1\n"]
+        "data", [b"\x89PNG\r\n\x1a\n\0\0", b"t_s,a\n1,\0\n", GOOD.encode("utf-16-le"), b"\x81C,1\n"]
     )
     def test_binary(self, told: RenderProblems, data: bytes) -> None:
         assert told(data) == (

@@ -14,7 +14,7 @@ from tests.engine.recording_files import GOOD, HEAD, RenderProblems, render_prob
 
 
 class TestAValue:
-    @pytest.mark.parametrize("cell", ["NaN", "nan", "inf", "-Infinity", "1e999", "12x"])
+    @pytest.mark.parametrize("cell", ["inf", "-Infinity", "1e999", "12x"])
     def test_that_is_not_a_finite_number(self, told: RenderProblems, cell: str) -> None:
         assert told(HEAD + f"0.01,92.5,2639\n0.02,{cell},2640\n") == (
             f"drive.csv:3:6: error: `{cell}` in column `torque_Nm` is not a finite number\n"
@@ -95,8 +95,8 @@ class TestATimeStamp:
             *((cell, "is not a number") for cell in ("NaN", "12:30:01", "x", "1_0", "0x1F")),
             *((cell, "is not finite") for cell in ("inf", "-Infinity")),
             *(
-                (cell, "is too large: its magnitude must be below 1e+12")
-                for cell in ("1e15", "-1e12", "1e999", "1000000000000")
+                (cell, "is too large: its magnitude must be below 1e+12 s")
+                for cell in ("1e13", "-1e12", "1e999", "10000000000000")
             ),
         ],
     )

@@ -1,4 +1,4 @@
-"""Notes of readers: what a recording leaves out or assumes is told once by the commands."""
+"""Assumptions: what a recording leaves out or assumes is told once by the commands."""
 
 from __future__ import annotations
 
@@ -34,7 +34,8 @@ BU_: ECU
 BO_ 256 Motor: 2 ECU
  SG_ T_em : 0|16@1- (0.25,0) [0|0] "Nm" ECU
 """
-SHORT = "left out: 1 of 21 frames of message `Motor`; the one at 1.2 s has 1 bytes"
+SHORT = "the one at 1.2 s has 1 bytes, the DBC says 2"
+CUT = "line 22 is no complete frame: `(1.210000) ca`"
 
 
 @pytest.fixture
@@ -61,22 +62,20 @@ def test_the_check_of_a_recording_tells_each_note_once(
     project: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     run("recording", "check", "drive.log", "--map", "bench", "--json")
-    findings = json.loads(capsys.readouterr().out)["findings"]
-    notes = [(f["channel"], f["text"]) for f in findings if f["kind"] == "reading"]
-    assert [channel for channel, _ in notes] == ["", "T_em"]
-    assert notes[0][1] == "left out: line 22; it is no complete frame: `(1.210000) ca`"
-    assert notes[1][1].startswith(SHORT)
-    assert {f["severity"] for f in findings if f["kind"] == "reading"} == {"note"}
+    found = json.loads(capsys.readouterr().out)["assumptions"]
+    assert [(item["recording"], item["reason"]) for item in found] == [
+        ("drive.log", CUT),
+        ("drive.log", SHORT),
+    ]
 
 
 def test_a_replay_tells_the_notes(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("replay", "selector", "drive.log", "--map", "bench") == 0
     text = " ".join(capsys.readouterr().out.split())
-    assert text.count(f"note: T_em: {SHORT}") == 1
-    assert "note: left out: line 22; it is no complete frame" in text
+    assert text.count(SHORT) == text.count(CUT) == 1
     assert run("replay", "selector", "drive.log", "--map", "bench", "--json") == 0
-    notes = json.loads(capsys.readouterr().out)["notes"]
-    assert [note["channel"] for note in notes] == ["", "T_em"]
+    found = json.loads(capsys.readouterr().out)["assumptions"]
+    assert [item["reason"] for item in found] == [CUT, SHORT]
 
 
 def test_an_unknown_unit_is_assumed_without_a_map_and_told(
@@ -85,8 +84,8 @@ def test_an_unknown_unit_is_assumed_without_a_map_and_told(
     (project / "car.dbc").write_text(DBC.replace('"Nm"', '"Furlong"'), "utf-8")
     run("recording", "check", "drive.log", "--dbc", "car.dbc", "--json")
     findings = json.loads(capsys.readouterr().out)["findings"]
-    texts = [f["text"] for f in findings if f["kind"] == "reading" and f["channel"] == "T_em"]
-    assert "has the unknown unit 'Furlong': the unit 1 is assumed" in texts
+    texts = [f["text"] for f in findings if f["kind"] == "unit" and f["channel"] == "T_em"]
+    assert texts == ["has the unit `Furlong`, which is not understood: taken without a unit"]
 
 
 def test_a_group_without_time_does_not_hide_the_others(
@@ -107,3 +106,22 @@ def test_a_group_without_time_does_not_hide_the_others(
     assert [channel["name"] for channel in found["channels"]] == ["T_em"]
     texts = {f["channel"]: f["text"] for f in found["findings"] if f["kind"] == "left_out"}
     assert "cannot be read (channel row has no time" in texts["row"]
+
+
+def test_words_of_a_dbc_are_names_of_an_enumeration(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    spec = SPEC.replace(
+        "inputs: {u: {unit: N*m, range: [-1000, 1000]}}",
+        "inputs: {u: {type: enum, values: [idle, busy]}}",
+    )
+    spec = spec.replace("u > 10 N*m", "u == busy").replace("u < 5 N*m", "u == idle")
+    (project / "spec" / "selector.yaml").write_text(spec, "utf-8")
+    (project / "spec" / "bench.yaml").write_text(MAP.replace(", unit: N*m", ""), "utf-8")
+    dbc = DBC.replace('(0.25,0) [0|0] "Nm"', '(1,0) [0|0] ""')
+    (project / "car.dbc").write_text(dbc + '\nVAL_ 256 T_em 5 "Busy" 9 "idle" ;\n', "utf-8")
+    rows = [f"({1.0 + 0.01 * k:.6f}) can0 100#{'05' if k > 3 else '09'}00" for k in range(10)]
+    (project / "drive.log").write_text("\n".join(rows) + "\n", "utf-8")
+    assert run("replay", "selector", "drive.log", "--map", "bench", "--json") == 0
+    events = json.loads(capsys.readouterr().out)["events"]
+    assert [event["target"] for event in events] == ["high"]
