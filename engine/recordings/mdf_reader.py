@@ -235,7 +235,8 @@ class _MdfFile:
     def _samples(self, name: str) -> Samples:
         """Return the samples of a channel; arrays are NaN.
 
-        Values that the file marks as invalid, or that its conversion calls missing, are None.
+        Values that are NaN, that the file marks as invalid, or that its conversion calls missing,
+        are None.
         Raises SpecError if the channel cannot be read or its group has no time.
         """
         (place,) = self.places[name]
@@ -255,8 +256,8 @@ class _MdfFile:
             texts = [str(value) for value in values]
             numbers: list[float | None] = [math.nan] * len(values)
         elif values.dtype.kind in "biuf":
-            numbers = [float(value) for value in values]
-            texts = [repr(value) for value in numbers]
+            texts = [repr(float(value)) for value in values]
+            numbers = [None if math.isnan(value) else float(value) for value in values]
         else:
             numbers, texts = _convert_texts(name, values.tolist(), raw, assumed)
         invalid = getattr(signal, "invalidation_bits", None)

@@ -223,6 +223,10 @@ class TestDamage:
             assert "error: the recording cannot be understood" in told(path, MAP)
             assert not [one for one in folder.rglob("*") if one.is_file() and one.stat().st_size]
 
-    def test_values_that_are_no_numbers_are_still_told(self, tmp_path: Path) -> None:
+    def test_a_value_that_is_not_a_number_is_missing(self, tmp_path: Path) -> None:
         path = write(tmp_path / "a.mf4", signal([1.0, math.nan]))
-        assert "a.mf4:2:1: error: `nan` in channel `T_em`" in told(path, MAP)
+        assert "a.mf4:2:1: error: channel `T_em` has no value here: `nan`" in told(path, MAP)
+        found = read(path, MAP.replace("unit: N*m", "unit: N*m, blank: skip"))
+        assert values_of(found) == (1.0,)
+        path = write(tmp_path / "a.mf4", signal([1.0, math.inf]))
+        assert "a.mf4:2:1: error: `inf` in channel `T_em`" in told(path, MAP)

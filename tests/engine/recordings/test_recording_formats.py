@@ -173,7 +173,7 @@ class TestMf4:
     def test_a_value_that_is_no_number_is_told(self, tmp_path: Path) -> None:
         write_mf4(tmp_path / "drive.mf4", wheel=[36.0, math.nan])
         text = told(tmp_path / "drive.mf4", COLUMNS)
-        assert "drive.mf4:2:1: error: `nan` in channel `v_wheel` is not a finite number" in text
+        assert "drive.mf4:2:1: error: channel `v_wheel` has no value here: `nan`" in text
 
     def test_junk_and_a_cut_off_file_are_told(self, tmp_path: Path) -> None:
         path = tmp_path / "drive.mf4"
