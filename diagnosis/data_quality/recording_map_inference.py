@@ -159,7 +159,8 @@ def _explain_no_number(samples: Samples) -> tuple[str, Severity]:
     if word:
         return f"has text, such as '{word[:MAX_SHOWN].replace('`', '')}'", "warning"
     if not count:
-        return f"has no number: it is {'all ' + texts[0] if texts else 'blank'}", "error"
+        word = next((text for k in range(len(values)) if (text := samples.text(k))), "")
+        return f"has no number: it is {'all ' + word if word else 'blank'}", "error"
     return f"has numbers in {count} of its {len(values)} cells only", "warning"
 
 

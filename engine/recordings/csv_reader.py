@@ -43,6 +43,8 @@ FORTRAN_EXPONENT = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d)", re.ASCII)
 """Pattern of the letter of an exponent that Fortran writes."""
 NAME_WITH_UNIT = re.compile(r".*\S ?(?:\[([^\[\]]+)\]|\(([^()]+)\))")
 """Pattern of a name with its unit in brackets, such as `T [degC]`."""
+MAX_NOTED = 5
+"""Largest number of texts in brackets that are noted."""
 TEXT_HINT = "a recording is CSV, or CSV.gz"
 
 
@@ -51,8 +53,9 @@ def read_csv(path: Path, mapping: RecordingMap, problems: Problems) -> RecordedF
 
     The map may state the format (`csv`); what it does not state is detected (`detect_dialect`) and
     returned as assumptions. Blank lines, rows without a cell that is not blank, and comments are
-    skipped. Rows whose length differs from the head line are reported and left out; reading of rows
-    stops after `MAX_PROBLEMS` problems. Cells that are no decimal numbers are NaN; empty cells and
+    skipped, and so is a last line that is too short and has no end of line. Other rows whose length
+    differs from the head line are reported and left out; reading of rows stops after
+    `MAX_PROBLEMS` problems. Cells that are no decimal numbers are NaN; empty cells and
     words for a missing value are None. Raises SpecError if the file cannot be read or unpacked, is
     no text, is empty or larger than `MAX_BYTES`, or if its numbers have two meanings.
     """
@@ -64,7 +67,7 @@ def read_csv(path: Path, mapping: RecordingMap, problems: Problems) -> RecordedF
     for column in mapping.columns.values():
         wanted.update(column.columns, [column.time] if column.time else [])
     dialect = detect_dialect(source, mapping.text_format, wanted, notes)
-    rows = _CsvRows(source, dialect, problems)
+    rows = _CsvRows(source, dialect, problems, is_cut=not text.endswith(("\n", "\r")))
     return RecordedFile(
         source,
         "column",
@@ -146,8 +149,12 @@ def _has_control_characters(text: str) -> bool:
 class _CsvRows:
     """Cells of a text table with their places."""
 
-    def __init__(self, source: Source, dialect: Dialect, problems: Problems) -> None:
+    def __init__(
+        self, source: Source, dialect: Dialect, problems: Problems, is_cut: bool = False
+    ) -> None:
+        """Split the lines of a source; `is_cut` tells that the last line has no end."""
         self.source = source
+        self.is_cut = is_cut
         self.dialect = dialect
         self.separator = dialect.separator
         self.head = list(dialect.names)
@@ -162,13 +169,18 @@ class _CsvRows:
     def _units(self) -> list[str]:
         """Return the unit of each column: of the line of units, else in brackets in its name.
 
-        A text in brackets that is no unit belongs to the name.
+        A text in brackets that is no known unit belongs to the name, which is noted.
         """
         if self.dialect.units:
             return [*self.dialect.units, *[""] * len(self.head)][: len(self.head)]
         found = [NAME_WITH_UNIT.fullmatch(name) for name in self.head]
         texts = [(match[1] or match[2] or "").strip() if match else "" for match in found]
-        return [text if unit_meanings(text) and text != "1" else "" for text in texts]
+        unknown = [text for text in texts if text and not unit_meanings(text)]
+        if unknown:
+            value = ", ".join(f"`{text}`" for text in dict.fromkeys(unknown[:MAX_NOTED]))
+            reason = "no known unit: a part of the name"
+            self.notes.append(Assumption("brackets in names", value, reason))
+        return [text if unit_meanings(text) and not text.isdigit() else "" for text in texts]
 
     def explain_missing(self, name: str) -> str:
         """Return the name with its unit in brackets, or why the head line has one cell only."""
@@ -229,7 +241,10 @@ class _CsvRows:
                 trailing += 1
             elif len(row) == width - 1 and not self.head[-1]:
                 row.append("")
-            if len(row) != width:
+            if self.is_cut and number == len(self.source.lines) and len(row) < width and self.rows:
+                value = f"line {number} left out"
+                self.notes.append(Assumption("last line", value, "it is cut off"))
+            elif len(row) != width:
                 label = f"this row has {len(row)} cells, the head line has {width}"
                 name = SEPARATOR_NAMES[self.separator]
                 hint = f"the cells of this file are divided by the {name}"

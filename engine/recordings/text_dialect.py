@@ -211,21 +211,25 @@ def split_row(line: str, separator: str) -> list[str]:
 def is_value(cell: str) -> bool:
     """Return whether a cell is a number, a time stamp or a word for a missing value."""
     text = cell.strip()
-    if DECIMAL.fullmatch(text) or COMMA_NUMBER.fullmatch(text) or calendar_kind(text):
-        return True
-    return text.casefold() in MISSING_WORDS and text != "-"
+    return _is_number_or_time(text) or text.casefold() in MISSING_WORDS
+
+
+def _is_number_or_time(text: str) -> bool:
+    """Return whether a text is a number or a time stamp."""
+    return bool(DECIMAL.fullmatch(text) or COMMA_NUMBER.fullmatch(text) or calendar_kind(text))
 
 
 def is_unit_row(row: Sequence[str], width: int) -> bool:
-    """Return whether a row below the names has units: no values, and a unit that is understood.
+    """Return whether a row below the names has units: no numbers, and a unit that is understood.
 
-    `width` is the number of names. A row without a text has no units.
+    `width` is the number of names. A row without a text has no units, and one with `-` for each
+    value has none.
     """
     cells = [cell.strip() for cell in row]
     texts = [cell for cell in cells if cell]
-    if not texts or abs(len(cells) - width) > 1 or any(map(is_value, texts)):
+    if not texts or abs(len(cells) - width) > 1 or any(map(_is_number_or_time, texts)):
         return False
-    return any(unit_meanings(text) for text in texts)
+    return any(unit_meanings(text) for text in texts if text.casefold() not in MISSING_WORDS)
 
 
 def _is_plain(line: str, separator: str) -> bool:

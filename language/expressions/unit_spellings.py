@@ -23,6 +23,7 @@ UNIT_WORDS: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("deg/s", "deg/sec", "dps", "degps"), ("deg/s",)),
     **dict.fromkeys(("kgm^2", "kgm2"), ("kg*m^2",)),
     **dict.fromkeys(("1", "-", "--", "---", "unitless", "dimensionless", "no unit"), ("1",)),
+    **dict.fromkeys(("none", "n/a"), ("1",)),
     **dict.fromkeys(("bool", "boolean", "flag", "enum", "state", "count", "counts"), ("1",)),
     **dict.fromkeys(("%", "pct", "prozent", "per cent"), ("percent",)),
     **dict.fromkeys(("deg C", "degrees C", "degree C", "degCelsius", "celsius"), ("degC",)),
@@ -132,6 +133,10 @@ BRACKETS = re.compile(r"\[(.*)\]|\((.*)\)|<(.*)>|\{(.*)\}")
 """Pattern of a text in brackets, such as `[Nm]`."""
 FACTOR = re.compile(r"([*/]?)([A-Za-z%]+)(?:\^?(-?\d))?")
 """Pattern of a factor with its operator and its exponent: `*m`, `/s^2`, `s-1`."""
+GROUP = re.compile(r"(/?)\(([^()]*)\)")
+"""Pattern of a part of a unit in parentheses, with the division sign before it."""
+INVERSE = str.maketrans("*/. ", "/*//")
+"""Operators of a part of a unit by which something is divided."""
 MAX_UNIT_LENGTH = 60
 """Largest number of characters of a unit."""
 
@@ -169,9 +174,10 @@ def normalise_unit_text(written: str) -> str:
 def _compose(text: str) -> str | None:
     """Return a product of symbols in the notation of the language; None for another text.
 
-    A denominator in parentheses divides by each of its factors: `1/(kg*m^2)` -> `1/kg/m^2`.
+    A denominator in parentheses divides by each of its factors: `1/(kg*m^2)` -> `1/kg/m^2`, and
+    `N*m/(rad/s)` -> `N*m*s/rad`.
     """
-    text = re.sub(r"\(([^()/]*)\)$", lambda match: match[1].replace("*", "/"), text)
+    text = GROUP.sub(lambda m: m[1] + (m[2].translate(INVERSE) if m[1] else m[2]), text)
     text = re.sub(r" ?([*/^]) ?", r"\1", text.replace("**", "^")).replace(".", "*")
     text = text.replace(" ", "*")
     body = text.removeprefix("1/")

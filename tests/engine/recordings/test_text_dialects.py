@@ -79,6 +79,7 @@ DIALECTS = {
         "\n".join('"' + x.replace(";", '","') + '"' for x in COMMA.split()),
         {"decimal sign"},
     ),
+    "last line cut off": (TABLE + "0.03,4", {"last line"}),
     "minus of typography": (TABLE.replace("-", "\N{MINUS SIGN}"), set()),
     "exponents of Fortran": (TABLE.replace("1200.5", "1.2005D+03"), set()),
 }
@@ -257,3 +258,22 @@ def test_the_log_of_a_motor_controller_with_semicolons(read_text: ReadText) -> N
     recording = read_text(text, time="unit: ms")
     assert recording.channels["a"].times == (Fraction(36000), Fraction(3600005, 100))
     assert recording.channels["a"].values == (0.1, 3.5)
+
+
+def test_a_line_of_units_may_have_dashes_and_texts_for_columns_that_are_not_read(
+    read_text: ReadText,
+) -> None:
+    recording = read_text("t,a,w,x,y\ns,Nm,rad/s,--,furlong\n0,1,2,3,4\n1,2,3,4,5\n")
+    assert recording.channels["a"].values == (1.0, 2.0)
+
+
+def test_a_row_without_values_is_no_line_of_units(read_text: ReadText) -> None:
+    recording = read_text("t,a,w\n0,-,-\n1,2,3\n2,3,4\n")
+    assert recording.channels["a"].values == (2.0, 3.0)
+    assert recording.assumptions == ()
+
+
+def test_a_text_in_brackets_that_is_no_unit_is_told(read_text: ReadText) -> None:
+    recording = read_text("t,a,w,x (left)\n0,1,2,3\n1,2,3,4\n")
+    (item,) = recording.assumptions
+    assert (item.subject, item.value) == ("brackets in names", "`left`")

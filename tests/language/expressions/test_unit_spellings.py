@@ -23,9 +23,9 @@ MEANT = {
     "degC": "degC \N{DEGREE SIGN}C [\N{DEGREE SIGN}C] \N{DEGREE CELSIUS} Celsius DEGC",
     "1": "1 - -- [-] [] unitless Unitless",
     "percent": "% percent Percent pct [%]",
-    "N*m*s/rad": "Nms/rad N*m*s/rad",
+    "N*m*s/rad": "Nms/rad N*m*s/rad Nm/(rad/s) N.m.s/rad",
     "m/s^2": "m/s2 m/s^2 m/s\N{SUPERSCRIPT TWO} m/(s^2) m/s**2",
-    "1/kg/m^2": "1/(kg*m^2)",
+    "1/kg/m^2": "1/(kg*m^2) 1/(kg.m2)",
     "us": "us \N{MICRO SIGN}s usec",
     "ohm": "Ohm \N{OHM SIGN} ohms",
 }

@@ -223,3 +223,64 @@ def test_a_loop_of_links_is_no_recording(project: Path, capsys: pytest.CaptureFi
     for more in (("--map", "bench"), ("--spec", "small_driveline")):
         assert run("loop.csv", *more) == 1
         assert "loop.csv:1:1: error: the recording cannot be read" in capsys.readouterr().err
+
+
+def write_in_dialect(path: Path) -> Path:
+    """Write the drive with semicolons, decimal commas, units and epochs in ms."""
+    times, values = tip_in()
+    lines = [";".join(["zeit", *values]), ";".join(["ms", *["-" for _ in values]])]
+    columns = [1_700_000_000_000 + np.round(1e3 * times), *values.values()]
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    lines += [";".join([f"{row[0]:.0f}", *(f"{v:.9g}" for v in row[1:])]) for row in rows]
+    path.write_text("\n".join(lines).replace(".", ",") + "\n", "utf-8")
+    return path
+
+
+def test_what_was_assumed_is_told_in_one_table(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_in_dialect(project / "strange.csv")
+    run("strange.csv")
+    text = capsys.readouterr().out
+    assert text.count("assumed") == 1
+    for row in ("separator     semicolon", "decimal sign  comma", "units         line 2"):
+        assert f"strange.csv  {row}" in text
+    run("strange.csv", "--json")
+    found = json.loads(capsys.readouterr().out)
+    assert {item["subject"] for item in found["assumptions"]} == {
+        "separator",
+        "decimal sign",
+        "units",
+    }
+
+
+def test_nothing_is_told_of_a_plain_file(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run("drive.csv")
+    assert "assumed" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("ms", 1e3), ("us", 1e6), ("s", 1.0)])
+def test_an_epoch_without_a_map_is_taken_in_its_unit(
+    project: Path, capsys: pytest.CaptureFixture[str], unit: str, factor: float
+) -> None:
+    times, values = tip_in()
+    lines = [",".join(["time", *values])]
+    for k, time in enumerate(times.tolist()):
+        stamp = f"{factor * (1.7e9 + round(time, 3)):.{0 if factor > 1 else 3}f}"
+        lines.append(",".join([stamp, *(f"{column[k]:.9g}" for column in values.values())]))
+    (project / "epoch.csv").write_text("\n".join(lines) + "\n", "utf-8")
+    run("epoch.csv")
+    text = capsys.readouterr().out
+    assert "100 Hz" in text
+    assert ("is taken in" in text) == (unit != "s")
+
+
+def test_a_unit_that_is_not_understood_is_told_without_a_map(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(project / "unit.csv")
+    head, _, rest = path.read_text("utf-8").partition("\n")
+    units = ",".join(["s", "furlong", *["-" for _ in head.split(",")[2:]]])
+    path.write_text(f"{head}\n{units}\n{rest}", "utf-8")
+    run("unit.csv")
+    assert "has the unit `furlong`, which is not understood" in capsys.readouterr().out
