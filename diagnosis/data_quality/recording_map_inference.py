@@ -32,7 +32,7 @@ from language.expressions.units import (
 )
 from language.model.system import ColumnMapping, RecordingMap
 from language.overlays.expand_document import display_path
-from language.text.diagnostic import Problems, Source, Span
+from language.text.diagnostic import Problems, Source, Span, SpecError
 from language.text.document import ScalarNode
 
 TIME_NAME = re.compile(
@@ -130,7 +130,7 @@ def _left_out_findings(file: RecordedFile, mapping: RecordingMap, name: str) -> 
             found += _clock_findings(file, column, mapping, name)
             text = "looks like the time of other columns"
         elif column not in aliases:
-            text, severity = _explain_no_number(file.read(column))
+            text, severity = _explain_left_out(file, column)
         if not text:
             continue
         if file.is_stamped and severity == "error":
@@ -139,6 +139,14 @@ def _left_out_findings(file: RecordedFile, mapping: RecordingMap, name: str) -> 
         text += ": left out (--map says which columns are read)"
         found.append(Finding("left_out", name, column, text, severity))
     return found
+
+
+def _explain_left_out(file: RecordedFile, column: str) -> tuple[str, Severity]:
+    """Return why a column is none of numbers, or cannot be read, and how severe that is."""
+    try:
+        return _explain_no_number(file.read(column))
+    except SpecError as error:
+        return f"cannot be read ({error.problems[0].label.replace('`', '')})", "warning"
 
 
 def _explain_no_number(samples: Samples) -> tuple[str, Severity]:
@@ -225,8 +233,14 @@ def _guess_time_unit(samples: Samples, name: str) -> tuple[Unit, str]:
 
 
 def _is_number(file: RecordedFile, name: str) -> bool:
-    """Return whether over 20 % of the cells are finite and few are not finite."""
-    values = file.read(name).values
+    """Return whether over 20 % of the cells are finite and few are not finite.
+
+    A column that cannot be read is none of numbers.
+    """
+    try:
+        values = file.read(name).values
+    except SpecError:
+        return False
     is_finite = [math.isfinite(value) for value in values if value is not None]
     number, bad = is_finite.count(True), is_finite.count(False)
     return number > MIN_NUMBER_FRACTION * len(values) and bad <= number // 10

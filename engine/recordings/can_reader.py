@@ -1,135 +1,133 @@
-"""CAN reader: decodes the frames of a log (candump, ASC, BLF) with the DBC files of the map."""
+"""CAN reader: decodes the frames of a log with the databases of the map, signal by signal."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+from engine.recordings.can_database import (
+    CanSignal,
+    is_j1939,
+    parameter_group,
+    read_databases,
+    signals_of,
+    unknown_selection,
+)
+from engine.recordings.can_log import CanFrame, CanLog, FrameKey, read_can_log
 from engine.recordings.recording_file import (
+    NO_VALUE,
+    Assumption,
     RecordedFile,
     Samples,
     exact_fraction,
     require_size,
-    unreadable_error,
 )
 from language.model.system import RecordingMap
 from language.overlays.expand_document import display_path
-from language.text.diagnostic import MissingToolError, Problem, Problems, Source, Span, SpecError
-from language.text.project_boundary import path_exists, project_root_of, require_inside_project
+from language.text.diagnostic import MissingToolError, Problem, Source, Span, SpecError
 
-DATABASE_SUFFIXES = (".dbc", ".arxml", ".kcd", ".sym")
-"""Suffixes of files that describe CAN messages; the first is suggested."""
-CanFrame = tuple[float, bytes]
-"""Time stamp [s] and data of a frame."""
-FrameKey = tuple[int, bool]
-"""Identifier of a frame, and whether it is an extended one."""
+MAX_SHOWN = 3
+"""Number of names or values that a message lists."""
 
 
 def read_can(path: Path, mapping: RecordingMap) -> RecordedFile:
-    """Read a log of CAN frames (`.blf`, `.asc`, `.log`) with the databases of the map.
+    """Read a log of CAN frames (`.blf`, `.asc`, `.trc`, `.log`) with the databases of the map.
 
-    Names are the signals of messages that occur in the log, both as `signal` and `message.signal`;
-    a `signal` of several such messages occurs once for each of them and cannot be read. Error and
-    remote frames are left out. Raises SpecError if a file cannot be read or understood, the log is
-    empty or too large, or the map names no database; MissingToolError without python-can or
-    cantools. A signal is decoded when it is read, which raises SpecError for a frame that does not
-    fit its message.
+    Error and remote frames are left out, see `decode_can` for the names. Raises SpecError if a file
+    cannot be read or understood, the log is empty or too large, or the map names no database;
+    MissingToolError without python-can or cantools.
     """
     source = Source(display_path(path))
     require_size(path, source)
+    can, cantools = import_can("a log of CAN frames")
+    if not mapping.databases:
+        label = f"map `{mapping.name}` names no DBC, which a log of CAN frames needs"
+        raise SpecError([Problem("missing", mapping.span, label, "`dbc: vehicle.dbc` in the map")])
+    messages, assumed = read_databases(mapping, cantools)
+    return decode_can(source, messages, read_can_log(path, source, can), tuple(assumed))
+
+
+def import_can(what: str) -> tuple[Any, Any]:
+    """Return the packages python-can and cantools. Raises MissingToolError, which names `what`."""
     try:
         import can
         import cantools
     except ImportError:
         raise MissingToolError(
-            "a log of CAN frames needs the packages `python-can` and `cantools`: "
-            "pip install 'modewright[can]'"
+            f"{what} needs the packages `python-can` and `cantools`: pip install 'modewright[can]'"
         ) from None
-    if not mapping.databases:
-        label = f"map `{mapping.name}` names no DBC, which a log of CAN frames needs"
-        raise SpecError([Problem("missing", mapping.span, label, "`dbc: vehicle.dbc` in the map")])
-    messages = _read_databases(mapping, cantools)
-    frames = _read_frames(path, source, can)
-    return _CanLog(source, messages, frames).to_recorded_file()
+    return can, cantools
 
 
-def _read_databases(mapping: RecordingMap, cantools: Any) -> dict[FrameKey, Any]:
-    """Return the messages of the databases of a map by frame key. Raises SpecError.
+def decode_can(
+    source: Source, messages: list[Any], log: CanLog, assumed: tuple[Assumption, ...] = ()
+) -> RecordedFile:
+    """Return a log as a recorded file of the signals whose messages occur in it.
 
-    A database is searched relative to the map, then to the working directory, and has to lie inside
-    the project.
+    A message is found by its identifier, else (J1939) by its parameter group. Names are `signal`
+    and `message.signal`. If a message is on several buses, there is `bus.message.signal`, too, and
+    for several sources of a parameter group `0x18f00400.message.signal`. A name that stands for
+    several signals occurs once for each of them and cannot be read. A signal is decoded when it is
+    read. `Samples.assumptions` tell frames that are left out; reading raises SpecError if these
+    are all.
     """
-    problems = Problems()
-    messages: dict[FrameKey, Any] = {}
-    for written in mapping.databases:
-        folders = (Path(written.span.source.name).parent, Path())
-        paths = [folder / written.text for folder in folders if path_exists(folder / written.text)]
-        if not paths:
-            problems.error("unreadable", written.span, f"there is no file `{written.text}`")
-            continue
-        if paths[0].suffix.lower() not in DATABASE_SUFFIXES:
-            label = f"`{written.text}` is not a DBC file by its name"
-            problems.error(
-                "unreadable", written.span, label, f"it ends with {DATABASE_SUFFIXES[0]}"
-            )
-            continue
-        with problems.collect_errors():
-            require_inside_project(
-                paths[0], written.span, project_root_of(Path(written.span.source.name))
-            )
-            try:
-                database = cantools.database.load_file(paths[0])
-                messages |= {(m.frame_id, m.is_extended_frame): m for m in database.messages}
-            except Exception as error:  # the library raises errors of any type for a broken file
-                label = f"`{written.text}` cannot be understood: {_first_line(error)}"
-                problems.error("unreadable", written.span, label)
-    problems.raise_if_errors()
-    return messages
+    return _DecodedLog(source, messages, log).to_recorded_file(assumed)
 
 
-def _read_frames(path: Path, source: Source, can: Any) -> dict[FrameKey, list[CanFrame]]:
-    """Return the data frames of a log by frame key; error and remote frames are skipped.
+class _Place(NamedTuple):
+    """Signal in the frames of a key; `names` are the names that stand for it, the longest last."""
 
-    Raises SpecError if the log cannot be understood.
-    """
-    readers = {".blf": can.BLFReader, ".asc": can.ASCReader, ".log": can.CanutilsLogReader}
-    frames: dict[FrameKey, list[CanFrame]] = {}
-    try:
-        with readers[path.suffix.lower()](str(path)) as log:
-            for frame in log:
-                if not (frame.is_error_frame or frame.is_remote_frame):
-                    key = (frame.arbitration_id, frame.is_extended_id)
-                    frames.setdefault(key, []).append((frame.timestamp, bytes(frame.data)))
-    except Exception as error:  # the library raises errors of any type for a broken file
-        raise unreadable_error(
-            source, f"understood as a log of CAN frames: {_first_line(error)}"
-        ) from None
-    return frames
+    key: FrameKey
+    signal: CanSignal
+    names: tuple[str, ...]
+    by_group: bool
 
 
-class _CanLog:
+class _DecodedLog:
     """Frames of a log with the messages that decode them."""
 
-    def __init__(
-        self, source: Source, messages: dict[FrameKey, Any], frames: dict[FrameKey, list[CanFrame]]
-    ) -> None:
+    def __init__(self, source: Source, messages: list[Any], log: CanLog) -> None:
         self.source = source
         self.messages = messages
-        self.frames = frames
-        self.decoded: dict[FrameKey, list[dict[str, Any]]] = {}
-        self.places: dict[str, list[tuple[FrameKey, Any]]] = {}
-        for key, message in messages.items():
-            for signal in message.signals:
-                self.places.setdefault(signal.name, []).append((key, signal))
-                self.places.setdefault(f"{message.name}.{signal.name}", []).append((key, signal))
+        self.log = log
+        self.places: dict[str, list[_Place]] = {}
+        for message in messages:
+            for place in self._places_of(message):
+                for name in place.names:
+                    self.places.setdefault(name, []).append(place)
 
-    def to_recorded_file(self) -> RecordedFile:
-        """Return the log as a recorded file of the signals whose messages occur in it."""
-        names = [
-            name for name, places in self.places.items() for key, _ in places if key in self.frames
+    def _places_of(self, message: Any) -> Iterator[_Place]:
+        """Yield the signals of a message for each key of its frames in the log."""
+        identity = (message.frame_id, message.is_extended_frame)
+        keys = [key for key in self.log.frames if key[1:] == identity]
+        by_group = not keys and is_j1939(message)
+        if by_group:
+            keys = self._keys_of_group(message.frame_id)
+        for key in keys:
+            for signal in signals_of(message):
+                short = f"{message.name}.{signal.signal.name}"
+                names = [signal.signal.name, short]
+                if len({other.identifier for other in keys}) > 1:
+                    names.append(f"{key.identifier:#x}.{short}")
+                if len({other.bus for other in keys}) > 1:
+                    names.append(f"{key.bus}.{names[-1]}")
+                yield _Place(key, signal, tuple(names), by_group)
+
+    def _keys_of_group(self, identifier: int) -> list[FrameKey]:
+        """Return the keys of extended frames with the parameter group of an identifier."""
+        group = parameter_group(identifier)
+        return [
+            key
+            for key in self.log.frames
+            if key.is_extended and parameter_group(key.identifier) == group
         ]
-        count = sum(len(frames) for frames in self.frames.values())
+
+    def to_recorded_file(self, assumed: tuple[Assumption, ...]) -> RecordedFile:
+        """Return the log as a recorded file."""
+        names = [name for name, places in self.places.items() for _ in places]
+        count = sum(map(len, self.log.frames.values()))
         return RecordedFile(
             self.source,
             "signal",
@@ -138,60 +136,150 @@ class _CanLog:
             count,
             True,
             explain_missing=self.explain_missing,
+            explain_ambiguous=self.explain_ambiguous,
+            assumptions=(*assumed, *self.log.assumptions),
         )
 
     def explain_missing(self, name: str) -> str:
         """Return the reason why a signal is missing; an empty text if none is known."""
-        for key, _ in self.places.get(name, []):
-            message = self.messages[key]
-            return f"its message `{message.name}` ({key[0]:#x}) is not in the log"
-        if not any(key in self.messages for key in self.frames):
-            return f"the DBC has none of the {len(self.frames)} messages of the log"
+        for message in self.messages:
+            for signal in message.signals:
+                if name in (signal.name, f"{message.name}.{signal.name}"):
+                    number = f"{message.frame_id:#x}"
+                    text = f"its message `{message.name}` ({number}) is not in the log"
+                    return text + self._explain_near(message)
+        known = {(message.frame_id, message.is_extended_frame) for message in self.messages}
+        if not any(key[1:] in known for key in self.log.frames):
+            return f"the DBC has none of the {len(self.log.frames)} messages of the log"
         return ""
 
-    def samples(self, name: str) -> Samples:
-        """Return the values of a signal, named by itself or as `message.signal`.
+    def _explain_near(self, message: Any) -> str:
+        """Return the identifiers of the log that resemble that of a message; else an empty text.
 
-        ValueError: the name stands for signals of several messages in the log.
+        These have the same parameter group, or the same number in the other format, or they differ
+        in one digit apart from the source address.
         """
-        ((key, signal),) = [place for place in self.places[name] if place[0] in self.frames]
-        decoded = self._decode(key)
-        frames = self.frames[key]
-        values: list[float | None] = [_to_float(values.get(signal.name)) for values in decoded]
+        number = message.frame_id
+        same_group = self._keys_of_group(number) if message.is_extended_frame else []
+        if same_group:
+            found = _join(f"{key.identifier:#x}" for key in same_group)
+            return (
+                f"; the log has its parameter group (PGN {parameter_group(number)}) as {found}: "
+                "write this identifier in the DBC, or declare the message as J1939 "
+                "(VFrameFormat J1939PG)"
+            )
+        other = [key for key in self.log.frames if key.identifier == number]
+        if other:
+            form = "an extended" if other[0].is_extended else "a standard"
+            return f"; the log has this number as {form} identifier"
+        if not message.is_extended_frame:
+            return ""
+        near = [
+            f"{key.identifier:#x}"
+            for key in self.log.frames
+            if key.is_extended and _count_differing_digits(key.identifier >> 8, number >> 8) == 1
+        ]
+        return f"; a similar one is {_join(near)}" if near else ""
+
+    def explain_ambiguous(self, name: str) -> str:
+        """Return the longer names of the signals that a name stands for."""
+        longest = list(dict.fromkeys(place.names[-1] for place in self.places[name]))
+        if len(longest) == 1:
+            return f"several DBC files define `{longest[0]}` differently: name the right one only"
+        return f"`column:` in the map names one of them: {_join(f'`{one}`' for one in longest)}"
+
+    def samples(self, name: str) -> Samples:
+        """Return the values of a signal by one of its names.
+
+        Frames without the signal (of another multiplexer value), short frames and frames of unknown
+        multiplexer values are left out; a value that the database calls missing is None. Raises
+        SpecError if no frame remains, and ValueError if the name stands for several signals.
+        """
+        (place,) = self.places[name]
+        signal, frames = place.signal, self.log.frames[place.key]
+        assumed = self._assumptions_of(place)
+        whole = [frame for frame in frames if len(frame.data) >= signal.length]
+        if len(whole) < len(frames):
+            assumed.append(_explain_short(signal, frames))
+        if not whole:
+            label = f"message `{signal.message.name}` has no whole frame: {assumed[-1].reason}"
+            raise SpecError([Problem("empty", Span(self.source, frames[0].line, 1), label)])
+        if signal.selector is not None:
+            assumed += _unknown_selections(signal, whole)
+        used = [frame for frame in whole if signal.is_selected(frame.data)]
+        words = [signal.word(frame.data) for frame in used]
+        values: list[float | None] = [
+            None if NO_VALUE.fullmatch(word) else signal.decode(frame.data)
+            for word, frame in zip(words, used, strict=True)
+        ]
+        for word, number in Counter(filter(NO_VALUE.fullmatch, words)).items():
+            value = f"{number} of {len(used)} samples have no value"
+            reason = f"the DBC calls them `{word}`"
+            assumed.append(Assumption(f"signal `{signal.signal.name}`", value, reason))
         return Samples(
             values,
-            lambda k: repr(values[k]),
-            lambda k: Span(self.source, k + 1, 1),
-            [exact_fraction(time) for time, _ in frames],
-            signal.unit or "",
+            lambda k: words[k] or repr(values[k]),
+            lambda k: Span(self.source, used[k].line, 1),
+            [exact_fraction(frame.time) for frame in used],
+            signal.signal.unit or "",
+            words if any(words) else (),
+            tuple(assumed),
         )
 
-    def _decode(self, key: FrameKey) -> Sequence[dict[str, Any]]:
-        """Return the decoded values of each frame of a message, cached.
-
-        Raises SpecError if a frame does not fit the database.
-        """
-        if key not in self.decoded:
-            message, decoded = self.messages[key], []
-            for k, (time, data) in enumerate(self.frames[key], start=1):
-                try:
-                    decoded.append(message.decode(data, decode_choices=False))
-                except Exception as error:
-                    label = f"frame {k} of message `{message.name}`, at {time:.6g} s, has "
-                    label += (
-                        f"{len(data)} bytes, the DBC says {message.length}: {_first_line(error)}"
-                    )
-                    raise SpecError([Problem("value", Span(self.source, k, 1), label)]) from None
-            self.decoded[key] = decoded
-        return self.decoded[key]
+    def _assumptions_of(self, place: _Place) -> list[Assumption]:
+        """Return what is assumed of the definition of a signal and of its message."""
+        message = place.signal.message
+        assumed = []
+        if place.by_group:
+            reason = f"it has the same parameter group (PGN {parameter_group(message.frame_id)}) "
+            reason += f"as {message.frame_id:#x} in the DBC"
+            value = f"{place.key.identifier:#x}"
+            assumed.append(Assumption(f"message `{message.name}`", value, reason))
+        overlapping = place.signal.overlapping
+        if overlapping:
+            others = _join([f"`{name}`" for name in overlapping])
+            reason = f"the DBC lets it overlap with {others} in message `{message.name}`"
+            subject = f"signal `{place.signal.signal.name}`"
+            assumed.append(Assumption(subject, "read as the DBC states", reason))
+        return assumed
 
 
-def _to_float(value: Any) -> float | None:
-    """Return a value as float; None remains None."""
-    return None if value is None else float(value)
+def _explain_short(signal: CanSignal, frames: list[CanFrame]) -> Assumption:
+    """Return that the frames are left out that are shorter than a signal and its message need."""
+    short = [frame for frame in frames if len(frame.data) < signal.length]
+    first = short[0]
+    return Assumption(
+        f"frames of message `{signal.message.name}`",
+        f"{len(short)} of {len(frames)} left out",
+        f"the one at {first.time!r} s has {len(first.data)} bytes, the DBC says {signal.length}",
+    )
 
 
-def _first_line(error: Exception) -> str:
-    """Return the first line of an error message, or the name of the error."""
-    text = str(error).strip().splitlines()
-    return text[0].rstrip(".") if text else type(error).__name__
+def _count_differing_digits(first: int, second: int) -> int:
+    """Return the number of hexadecimal digits in which two numbers of 6 digits differ."""
+    return sum(a != b for a, b in zip(f"{first:06x}", f"{second:06x}", strict=True))
+
+
+def _unknown_selections(signal: CanSignal, frames: list[CanFrame]) -> list[Assumption]:
+    """Return that frames are left out whose multiplexer values no signal of the message has."""
+    assumed = []
+    selector = signal.selector
+    while selector is not None:
+        chosen = [frame for frame in frames if selector.is_selected(frame.data)]
+        found = Counter(unknown_selection(signal.message, selector, f.data) for f in chosen)
+        found.pop(None, None)
+        if found:
+            values = _join([str(value) for value in sorted(found, key=lambda value: value or 0)])
+            reason = f"the DBC does not know the value {values} of the multiplexer "
+            reason += f"`{selector.signal.name}`"
+            value = f"{found.total()} of {len(frames)} left out"
+            assumed.append(Assumption(f"frames of message `{signal.message.name}`", value, reason))
+        selector = selector.selector
+    return assumed
+
+
+def _join(names: Iterator[str] | list[str]) -> str:
+    """Return the first names (`MAX_SHOWN`), separated by commas, and the number of the others."""
+    listed = list(dict.fromkeys(names))
+    rest = f" and {len(listed) - MAX_SHOWN} more" if len(listed) > MAX_SHOWN else ""
+    return ", ".join(listed[:MAX_SHOWN]) + rest

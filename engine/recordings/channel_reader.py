@@ -73,7 +73,8 @@ def require_names(
             hint = file.explain_missing(name) or suggest_name(name, file.names)
             problems.error("column", file.header_span, label, hint)
         elif count > 1:
-            problems.error("column", file.header_span, f"there are two {file.noun}s `{name}`")
+            label = f"there are {'two' if count == 2 else count} {file.noun}s `{name}`"
+            problems.error("column", file.header_span, label, file.explain_ambiguous(name))
     if not file.rows:
         label = "the recording has a head line and no values"
         if file.is_stamped:
@@ -242,7 +243,7 @@ class ChannelReader:
 
     def _report_unsorted(self, text: str, last: Fraction, place: Span) -> None:
         """Report a time stamp that is not above the previous one."""
-        label = f"the time stamp {text} is not above the one before, {float(last):.9g}"
+        label = f"the time stamp {text} is not above the one before, {float(last)!r}"
         hint = "sort the recording, and remove repeated rows"
         self.problems.error("time", place, label, hint)
 
@@ -260,7 +261,7 @@ class ChannelReader:
             self.problems.error("time", column.span, label, hint)
         for k, (before, after) in enumerate(itertools.pairwise(stamps), start=1):
             if after <= before and not self.has_max_problems:
-                self._report_unsorted(f"{float(after):.9g}", before, parts[0].place(k))
+                self._report_unsorted(repr(float(after)), before, parts[0].place(k))
         return stamps
 
     def samples(self, column: ColumnMapping) -> tuple[tuple[Fraction, ...], tuple[float, ...]]:
@@ -274,6 +275,7 @@ class ChannelReader:
         the map refuses them, another unit in the file, and a column without values.
         """
         parts = [self.file.read(name) for name in column.columns]
+        self.assumptions += [item for part in parts for item in part.assumptions]
         if self.file.is_stamped:
             stamps = self._own_stamps(column, parts)
         else:
@@ -320,11 +322,12 @@ class ChannelReader:
         """
         factor, offset = float(column.unit.factor), float(column.unit.offset)
         self._check_unit(name, samples.unit, column)
-        scaled = None if self.has_max_problems else _scale_all(samples.values, factor, offset)
+        values = self._numbers_of_words(samples, column)
+        scaled = None if self.has_max_problems else _scale_all(values, factor, offset)
         if scaled is not None:
             return [*scaled]
         result: list[float | None] = []
-        for k, value in enumerate(samples.values):
+        for k, value in enumerate(values):
             if self.has_max_problems:
                 break
             if value is not None and not math.isfinite(value):
@@ -340,6 +343,19 @@ class ChannelReader:
                 self.problems.error("value", samples.place(k), label, hint)
             result.append(None if value is None else value * factor + offset)
         return result
+
+    def _numbers_of_words(self, samples: Samples, column: ColumnMapping) -> Sequence[float | None]:
+        """Return the values, or the numbers in the map's signal of the words of the file.
+
+        The words count if the signal knows one of them; a word that it does not know is then NaN.
+        """
+        numbers = [self._number_of_word(word, column) for word in samples.words]
+        if not any(number is not None for number in numbers):
+            return samples.values
+        return [
+            number if number is not None else math.nan if word and value is not None else value
+            for number, word, value in zip(numbers, samples.words, samples.values, strict=True)
+        ]
 
     def _number_of_word(self, text: str, column: ColumnMapping) -> float | None:
         """Return the number of a truth word or of a name of an enumeration; None for others."""

@@ -23,6 +23,7 @@ from engine.recordings.recording_window import strip_window_suffix, windows_in_u
 from language.model.system import ColumnMapping, RecordingMap, Window
 from language.overlays.expand_document import display_path
 from language.text.diagnostic import Problems, Source, Span
+from language.text.sanitise import escape_invisible
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,10 @@ def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Re
     problems.raise_if_errors()
     place = Span(Source(display_path(strip_window_suffix(path))), 1, 1)
     recording = Recording(path.name, channels, max(known), min(known), windows, place)
-    assumed = tuple(dict.fromkeys((*file.assumptions, *reader.assumptions)))
+    assumed = tuple(
+        Assumption(*map(escape_invisible, (item.subject, item.value, item.reason)))
+        for item in dict.fromkeys((*file.assumptions, *reader.assumptions))
+    )
     recording = dataclasses.replace(recording, assumptions=assumed)
     return crop_to_windows(recording, mapping)
 
@@ -155,10 +159,10 @@ def _share_seconds(channels: Iterable[Channel]) -> None:
 def open_recording(path: Path, mapping: RecordingMap, problems: Problems) -> RecordedFile:
     """Open a file by its suffix in any case; a time window at the end of the path is ignored.
 
-    `.parquet` is Parquet; `.mf4`, `.mdf`, and `.dat` that starts with `MDF` are MDF; `.blf`, `.asc`
-    and `.log` are CAN logs; all others CSV, whose faulty rows are added to `problems`. Raises
-    SpecError for a pipe, a device and a file that cannot be read, and MissingToolError if a library
-    is not installed.
+    `.parquet` is Parquet; `.mf4`, `.mdf`, and `.dat` that starts with `MDF` are MDF; `.blf`,
+    `.asc`, `.trc` and `.log` are CAN logs; all others CSV, whose faulty rows are added to
+    `problems`. Raises SpecError for a pipe, a device and a file that cannot be read, and
+    MissingToolError if a library is not installed.
     """
     path = strip_window_suffix(path)
     require_regular_file(path, Source(display_path(path)))
@@ -170,8 +174,8 @@ def open_recording(path: Path, mapping: RecordingMap, problems: Problems) -> Rec
     if ending in (".mf4", ".mdf") or (ending == ".dat" and _is_mdf(path)):
         from engine.recordings.mdf_reader import read_mdf
 
-        return read_mdf(path)
-    if ending in (".blf", ".asc", ".log"):
+        return read_mdf(path, mapping)
+    if ending in (".blf", ".asc", ".trc", ".log"):
         from engine.recordings.can_reader import read_can
 
         return read_can(path, mapping)

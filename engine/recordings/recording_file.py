@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import stat
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -15,29 +16,20 @@ MAX_BYTES = 512 * 1024 * 1024
 MAX_PROBLEMS = 20
 """Number of reported problems after which values are not checked further."""
 
-
-@dataclass(frozen=True)
-class Samples:
-    """Samples under one name, in the order of the file.
-
-    `values` are None for an empty cell, and not finite if `text` is no finite number. `text` and
-    `place` give the text and the place of a sample by index; in a binary format the row or sample
-    number stands for the line. `stamps` [s] are the time stamps of the samples; None if the rows
-    share a time column. `unit` is the unit text of the file.
-    """
-
-    values: Sequence[float | None]
-    text: Callable[[int], str]
-    place: Callable[[int], Span]
-    stamps: Sequence[Fraction] | None = None
-    unit: str = ""
+NO_VALUE = re.compile(
+    r"sna|signal[ _]?not[ _]?available|not[ _]?available|not[ _]?valid|invalid|n/?a|error|"
+    r"undefined|no[ _]?value|no[ _]?data",
+    re.IGNORECASE,
+)
+"""Words for a missing value in the value tables of DBC and MF4 files."""
 
 
 @dataclass(frozen=True)
 class Assumption:
     """What a reader has taken of a file that neither the file nor the map states.
 
-    `subject` is for example `separator`, `value` is `semicolon`, and `reason` the evidence.
+    `subject` is for example `separator`, `value` is `semicolon`, and `reason` the evidence. It is
+    also what the reader left out, with the reason.
     """
 
     subject: str
@@ -46,13 +38,34 @@ class Assumption:
 
 
 @dataclass(frozen=True)
+class Samples:
+    """Samples under one name, in the order of the file.
+
+    `values` are None for an empty cell, and not finite if `text` is no finite number. `text` and
+    `place` give the text and the place of a sample by index; in a binary format the row or sample
+    number stands for the line. `stamps` [s] are the time stamps of the samples; None if the rows
+    share a time column. `unit` is the unit text of the file. `words` are the words of the file for
+    the numbers, empty if it has none. `assumptions` also tell what is left out.
+    """
+
+    values: Sequence[float | None]
+    text: Callable[[int], str]
+    place: Callable[[int], Span]
+    stamps: Sequence[Fraction] | None = None
+    unit: str = ""
+    words: Sequence[str] = ()
+    assumptions: tuple[Assumption, ...] = ()
+
+
+@dataclass(frozen=True)
 class RecordedFile:
     """File of measurements with named columns, channels or signals.
 
     `noun` is the word for these in messages. `read` returns the samples of a name. `is_stamped`
     tells whether each name has its own time stamps. `explain_missing` returns a hint for a missing
-    name, or an empty text. `head_line` is the number of the line with the names. `assumptions` are
-    what the reader has taken.
+    name, `explain_ambiguous` one for a name that occurs several times, or an empty text.
+    `head_line` is the number of the line with the names. `assumptions` are what the reader has
+    taken of the whole file.
     """
 
     source: Source
@@ -62,6 +75,7 @@ class RecordedFile:
     rows: int
     is_stamped: bool = False
     explain_missing: Callable[[str], str] = lambda name: ""
+    explain_ambiguous: Callable[[str], str] = lambda name: ""
     head_line: int = 1
     assumptions: tuple[Assumption, ...] = ()
 
@@ -120,3 +134,9 @@ def exact_fraction(value: float) -> Fraction:
     Raises ValueError if the number is not finite.
     """
     return Fraction(repr(float(value)))
+
+
+def first_line(error: Exception) -> str:
+    """Return the first line of an error message, or the name of the error."""
+    text = str(error).strip().splitlines()
+    return text[0].rstrip(".") if text else type(error).__name__

@@ -26,7 +26,8 @@ def _recording() -> None:
 @recording.command(epilog=EXIT_CODES)
 def check(
     files: Annotated[
-        list[Path], typer.Argument(help="CSV(.gz), Parquet, MF4, or CAN logs: BLF, ASC, candump")
+        list[Path],
+        typer.Argument(help="CSV(.gz), Parquet, MF4, or CAN logs: BLF, ASC, TRC, candump"),
     ],
     mapping: Annotated[
         str | None, typer.Option("--map", "-m", help="map of columns: name or file")

@@ -54,6 +54,7 @@ def test_a_column_is_fed_to_an_input_or_compared_with_an_output() -> None:
 def test_a_column_is_taken_as_it_is_unless_it_says_more() -> None:
     plain = one("to: u")
     assert (plain.sign, plain.blank, plain.time) == (1, "refuse", None)
+    assert (plain.file_unit, one("to: u, file_unit: Nm/s").file_unit) == ("", "Nm/s")
     assert (plain.delay, plain.scale) == (Fraction(0), (Fraction(1), dimension("1")))
     assert column_dimension(plain) == dimension("1")
 

@@ -1,0 +1,368 @@
+"""CAN log: reads the frames of a log (candump, ASC, TRC, BLF) by bus and identifier.
+
+The lines of a text log are checked first, because python-can ends at the first line that it cannot
+parse. Lines that are no complete frames are left out and told.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from engine.recordings.recording_file import Assumption, first_line, unreadable_error
+from language.text.diagnostic import Problem, Source, Span, SpecError
+
+LOG_SUFFIXES = (".blf", ".asc", ".log", ".trc")
+"""Suffixes of logs of CAN frames."""
+CANDUMP_LINE = re.compile(
+    r"\s*\(\d+(?:\.\d+)?\)\s+\S+\s+(?P<id>[0-9A-F]{3}|[0-9A-F]{8})#"
+    r"(?:#[0-9A-F](?:[0-9A-F]{2})*|(?:[0-9A-F]{2})*|R[0-9A-F]?)(?:\s+[RT])?\s*",
+    re.IGNORECASE | re.ASCII,
+)
+"""Pattern of a frame that `candump -L` writes."""
+CANDUMP_ERROR_FLAG = 0x20000000
+"""Bit of the identifier of an error frame in a candump log."""
+CANDUMP_SCREEN = re.compile(r"\s*(?:\([\d.:\s-]+\)\s+)?\w+\s+[0-9A-F]+\s+\[\d+\]", re.IGNORECASE)
+"""Pattern of a line that candump writes to the screen, which is no log."""
+ASC_STAMP = re.compile(r"(\s*)(\d+)([.,])(\d+)(?=\s)", re.ASCII)
+"""Pattern of the time stamp at the start of an ASC line."""
+ASC_RELATIVE = re.compile(r"\s*base\s+(?:hex|dec)\s+timestamps\s+relative", re.IGNORECASE)
+"""Pattern of the ASC header whose stamps are differences to the line before."""
+ASC_FD_EVENT = re.compile(r"\s*[\d.]+\s+CANFD\s+[A-Z]", re.IGNORECASE)
+"""Pattern of an ASC line of CAN FD that is no frame, such as the start of the measurement."""
+TRC_FRAME = re.compile(
+    r"\s*\d+\)?\s+[\d.]+\s+"
+    r"(?:(?:\d+\s+)?(?:Rx|Tx|DT|FD|FB|FE|BI)\s|(?!FFFFFFFF)[0-9A-F]{4,8}\s+\d)"
+)
+"""Pattern of the start of a frame in a TRC log."""
+TRC_VERSIONS = "1.0, 1.1, 1.3, 2.0 and 2.1"
+"""Versions of TRC that python-can reads."""
+MAX_SHOWN = 60
+"""Number of characters of a line that a message shows."""
+
+
+class FrameKey(NamedTuple):
+    """Name of the bus (empty if the log has none), identifier, and whether it is extended."""
+
+    bus: str
+    identifier: int
+    is_extended: bool
+
+
+class CanFrame(NamedTuple):
+    """Time stamp [s] and data of a frame, and its line in a text log, else its number."""
+
+    time: float
+    data: bytes
+    line: int
+
+
+@dataclass(frozen=True)
+class CanLog:
+    """Data frames of a log by their keys, and what is left out or assumed."""
+
+    frames: dict[FrameKey, list[CanFrame]]
+    assumptions: tuple[Assumption, ...] = ()
+
+
+class _BadLine(NamedTuple):
+    """Line of a text log that is no complete frame, with the reason."""
+
+    number: int
+    text: str
+    reason: str
+
+
+def read_can_log(path: Path, source: Source, can: Any) -> CanLog:
+    """Return the data frames of a log; error and remote frames are left out.
+
+    `can` is the package python-can. A frame that repeats the one before (same bus, identifier,
+    time stamp and data) is left out. Raises SpecError if the log has no frame, or more lines that
+    cannot be understood than frames.
+    """
+    logging.getLogger("can").setLevel(logging.CRITICAL)
+    suffix = path.suffix.lower()
+    assumed: list[Assumption] = []
+    if suffix == ".blf":
+        numbered = _read_binary(path, source, can, assumed)
+    else:
+        numbered = _read_text(path, source, can, assumed)
+    frames: dict[FrameKey, list[CanFrame]] = {}
+    for line, frame in numbered:
+        if not (frame.is_error_frame or frame.is_remote_frame):
+            bus = _bus_name(frame.channel, suffix)
+            key = FrameKey(bus, frame.arbitration_id, frame.is_extended_id)
+            found = CanFrame(frame.timestamp, bytes(frame.data), line)
+            frames.setdefault(key, []).append(found)
+    return CanLog(remove_repeated_frames(frames, assumed), tuple(assumed))
+
+
+def remove_repeated_frames(
+    frames: dict[FrameKey, list[CanFrame]], assumed: list[Assumption]
+) -> dict[FrameKey, list[CanFrame]]:
+    """Return the frames without those that repeat the stamp and data of the one before.
+
+    A logger that records sent and received frames writes such pairs. A note gives their number.
+    """
+    result, count = {}, 0
+    for key, series in frames.items():
+        last = [None, *series[:-1]]
+        kept = [f for f, before in zip(series, last, strict=True) if not _repeats(f, before)]
+        count += len(series) - len(kept)
+        result[key] = kept
+    if count:
+        value = f"{count} of {sum(map(len, frames.values()))} left out"
+        reason = "they repeat the time stamp and the data of the frame before"
+        assumed.append(Assumption("frames", value, reason))
+    return result
+
+
+def _repeats(frame: CanFrame, before: CanFrame | None) -> bool:
+    """Return whether a frame has the time stamp and the data of the one before."""
+    return before is not None and frame[:2] == before[:2]
+
+
+def _bus_name(channel: Any, suffix: str) -> str:
+    """Return the name of a bus as the log shows it: `can0`, or `CAN1` for the number 1.
+
+    python-can counts the channels of ASC and BLF from 0.
+    """
+    if channel is None or isinstance(channel, str):
+        return channel or ""
+    return f"CAN{channel + (suffix in ('.asc', '.blf'))}"
+
+
+def _read_binary(
+    path: Path, source: Source, can: Any, assumed: list[Assumption]
+) -> list[tuple[int, Any]]:
+    """Return the numbered frames of a BLF file up to its first error or its cut end.
+
+    Both are noted. Raises SpecError if there is no frame before the error.
+    """
+    frames: list[tuple[int, Any]] = []
+    try:
+        with can.BLFReader(str(path)) as log:
+            frames.extend(enumerate(log, start=1))
+            size, stated = path.stat().st_size, log.file_size
+        if size < stated:
+            reason = f"the log has {size} of {stated} bytes"
+            assumed.append(Assumption("end of the log", "left out", reason))
+    except Exception as error:  # the library raises errors of any type for a broken file
+        if not frames:
+            action = "understood as a log of CAN frames: it is no BLF file, or it is damaged"
+            raise unreadable_error(source, action) from None
+        value = f"all behind frame {len(frames)} left out"
+        assumed.append(Assumption("frames", value, f"the log is damaged: {first_line(error)}"))
+    return frames
+
+
+def _read_text(
+    path: Path, source: Source, can: Any, assumed: list[Assumption]
+) -> list[tuple[int, Any]]:
+    """Return the frames of a text log with the numbers of their lines. Raises SpecError."""
+    text = _decode_text(path.read_bytes())
+    lines = list(enumerate(text.splitlines(), start=1))
+    bad: list[_BadLine] = []
+    suffix = path.suffix.lower()
+    is_header: Callable[[str], bool] = _is_trc_header
+    if suffix != ".log":
+        _drop_cut_line(text, lines, bad)
+    if suffix == ".log":  # it has no header
+        reader, is_header = can.CanutilsLogReader, lambda _: False
+        checked = _check_candump(lines, bad)
+    elif suffix == ".asc":
+        reader, is_header = can.ASCReader, _is_asc_header
+        checked = _check_asc(lines, assumed)
+    else:
+        reader, checked = can.TRCReader, lines
+    header = [(number, line) for number, line in checked if is_header(line)]
+    body = [(number, line) for number, line in checked if not is_header(line)]
+    if suffix == ".asc":
+        header = _complete_asc_header(header, assumed)
+    frames = list(_parse_lines(reader, header, body, bad))
+    bad.sort()
+    if len(bad) > len(frames) or not frames:
+        raise _no_log_error(source, suffix, lines, bad)
+    if bad:
+        first = bad[0]
+        reason = f"line {first.number} {first.reason}: `{_crop(first.text)}`"
+        assumed.append(Assumption("lines", f"{len(bad)} left out", reason))
+    return frames
+
+
+def _decode_text(data: bytes) -> str:
+    """Return the text of a log in UTF-8, UTF-16 with its mark, or Windows-1252."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return data.decode("utf-16", "replace")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", "replace")
+
+
+def _check_candump(lines: Iterable[tuple[int, str]], bad: list[_BadLine]) -> list[tuple[int, str]]:
+    """Return the complete lines of a candump log without error frames; others are added to `bad`.
+
+    python-can takes a half byte at the end of a cut line as a whole one, and the error frames of
+    most classes as data frames.
+    """
+    result = []
+    for number, line in lines:
+        match = CANDUMP_LINE.fullmatch(line)
+        if match:
+            if not int(match["id"], 16) & CANDUMP_ERROR_FLAG:
+                result.append((number, line))
+        elif line.strip():
+            bad.append(_BadLine(number, line, "is no complete frame"))
+    return result
+
+
+def _drop_cut_line(text: str, lines: list[tuple[int, str]], bad: list[_BadLine]) -> None:
+    """Move a last line that begins with a number and has no line break from `lines` to `bad`.
+
+    Its last byte may be cut.
+    """
+    if lines and not text.endswith(("\n", "\r")) and lines[-1][1].lstrip()[:1].isdigit():
+        number, line = lines.pop()
+        bad.append(_BadLine(number, line, "may be cut, because it has no line break"))
+
+
+def _check_asc(
+    lines: Sequence[tuple[int, str]], assumed: list[Assumption]
+) -> list[tuple[int, str]]:
+    """Return the lines of an ASC log with absolute stamps and decimal points; both are noted.
+
+    Relative stamps are differences to the line before (also to lines that are no frames). Lines of
+    CAN FD that are no frames are left out, because python-can fails at them.
+    """
+    head = [line for _, line in lines if _is_asc_header(line)]
+    is_relative = any(ASC_RELATIVE.match(line) for line in head)
+    has_comma, now = False, Decimal(0)
+    result = []
+    for number, line in lines:
+        match = ASC_STAMP.match(line)
+        if match:
+            stamp = Decimal(f"{match[2]}.{match[4]}")
+            now = now + stamp if is_relative else stamp
+            has_comma = has_comma or match[3] == ","
+            line = f"{match[1]}{now:f}{line[match.end() :]}"
+        if not ASC_FD_EVENT.match(line):
+            result.append((number, line))
+    if is_relative:
+        reason = "the header states relative time stamps"
+        assumed.append(Assumption("time stamps", "added to those of the lines before", reason))
+    if has_comma:
+        assumed.append(Assumption("decimal sign", "comma", "the form of the time stamps"))
+    return result
+
+
+def _complete_asc_header(
+    header: Sequence[tuple[int, str]], assumed: list[Assumption]
+) -> list[tuple[int, str]]:
+    """Return the header of an ASC log with its last line, which python-can expects.
+
+    Without that line it would skip the first frame. A header without the base is noted.
+    """
+    if not any(re.match(r"\s*base\s", line, re.IGNORECASE) for _, line in header):
+        reason = "the header does not state the base"
+        assumed.append(Assumption("numbers", "hexadecimal", reason))
+    parts = [one for one in header if "events" not in one[1].lower()]
+    return [*parts, (0, "internal events logged")]
+
+
+def _is_asc_header(line: str) -> bool:
+    """Return whether a line of an ASC log belongs to its header: it states date, base or events."""
+    return bool(
+        re.match(r"\s*(?:date\s|base\s+(?:hex|dec)|(?:no\s*)?internal\s+events)", line, re.I)
+    )
+
+
+def _is_trc_header(line: str) -> bool:
+    """Return whether a line of a TRC log belongs to its header or is a comment."""
+    return line.lstrip().startswith(";")
+
+
+class _LineFeed:
+    """Text file of numbered lines; `number` is that of the line that was read last."""
+
+    def __init__(self, lines: Iterable[tuple[int, str]]) -> None:
+        self.lines = iter(lines)
+        self.number = 0
+
+    def __iter__(self) -> Iterator[str]:
+        """Return the feed itself: reading continues at the next line."""
+        return self
+
+    def __next__(self) -> str:
+        """Return the next line."""
+        self.number, line = next(self.lines)
+        return line + "\n"
+
+    def close(self) -> None:
+        """Do nothing: the lines are in memory."""
+
+
+def _parse_lines(
+    reader: Callable[[Any], Any],
+    header: Sequence[tuple[int, str]],
+    body: Sequence[tuple[int, str]],
+    bad: list[_BadLine],
+) -> Iterator[tuple[int, Any]]:
+    """Yield the frames of a text log with the numbers of their lines.
+
+    The reader of python-can starts again, with the header, behind each line at which it fails;
+    these lines are added to `bad`, and so are frames of TRC that it skips.
+    """
+    texts = {number: line for number, line in (*header, *body)}
+    positions = {number: k for k, (number, _) in enumerate(body)}
+    read: set[int] = set()
+    start = 0
+    while start < len(body):
+        feed = _LineFeed([*header, *body[start:]])
+        try:
+            for frame in reader(feed):
+                read.add(feed.number)
+                yield feed.number, frame
+            start = len(body)
+        except Exception:  # the library raises errors of any type for a broken line
+            failed = feed.number
+            bad.append(_BadLine(failed, texts[failed], "is no complete frame"))
+            read.add(failed)
+            start = positions.get(failed, len(body)) + 1
+    for number, line in body:
+        if number not in read and TRC_FRAME.match(line):
+            bad.append(_BadLine(number, line, "is no complete frame"))
+
+
+def _no_log_error(
+    source: Source, suffix: str, lines: Sequence[tuple[int, str]], bad: Sequence[_BadLine]
+) -> SpecError:
+    """Return the error for a text log without frames, at its first line that is no frame."""
+    data = [one for one in lines if one[1].strip() and not one[1].lstrip().startswith((";", "//"))]
+    number, line = (bad[0].number, bad[0].text) if bad else (data or [(1, "")])[-1]
+    label = "this is no log of CAN frames"
+    help = {
+        ".log": "a line of `candump -L` is `(1700000000.000000) can0 100#0F00000064010000`",
+        ".asc": "a line of a frame is `0.010000 1  100  Rx   d 8 0F 00 00 00 64 01 00 00`",
+        ".trc": f"the versions {TRC_VERSIONS} of TRC are read; the file names its own in "
+        "`;$FILEVERSION=`",
+    }[suffix]
+    if suffix == ".log" and CANDUMP_SCREEN.match(line):
+        label = "this is what `candump` writes to the screen, and no log"
+        help = "`candump -L` or `candump -l` write a log"
+    if suffix == ".log" and not bad:
+        label, help = "the log has no data frames", ""
+    elif line.strip():
+        label += f": `{_crop(line)}`"
+    return SpecError([Problem("unreadable", Span(source, number, 1), label, help)])
+
+
+def _crop(line: str) -> str:
+    """Return the first `MAX_SHOWN` characters of a line without outer blanks."""
+    text = line.strip()
+    return text if len(text) <= MAX_SHOWN else text[:MAX_SHOWN] + "..."
