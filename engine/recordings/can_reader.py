@@ -17,6 +17,7 @@ from language.model.system import RecordingMap
 from language.overlays.expand_document import display_path
 from language.text.diagnostic import MissingToolError, Problem, Problems, Source, Span, SpecError
 from language.text.project_boundary import path_exists, project_root_of, require_inside_project
+from language.text.regular_file import open_regular_file
 
 DATABASE_SUFFIXES = (".dbc", ".arxml", ".kcd", ".sym")
 """Suffixes of files that describe CAN messages; the first is suggested."""
@@ -79,6 +80,7 @@ def _read_databases(mapping: RecordingMap, cantools: Any) -> dict[FrameKey, Any]
                 paths[0], written.span, project_root_of(Path(written.span.source.name))
             )
             try:
+                open_regular_file(paths[0]).close()  # raises OSError for a pipe
                 database = cantools.database.load_file(paths[0])
                 messages |= {(m.frame_id, m.is_extended_frame): m for m in database.messages}
             except Exception as error:  # the library raises errors of any type for a broken file
