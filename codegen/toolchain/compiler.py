@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import errno
 import itertools
 import os
 import shlex
@@ -148,7 +149,7 @@ def run_compiler(command: Sequence[str], target: Path) -> None:
 
     Raises BuildError for a nonzero exit code, with its output from the first error on. Raises
     BrokenToolError for a compiler that does not compile TRIAL_SOURCE either, does not start, makes
-    no file, or is not done after TIMEOUT seconds. Warnings are dropped.
+    no file, has no space for its files, or is not done after TIMEOUT seconds. Warnings are dropped.
     """
     run_compilers([(command, target)])
 
@@ -177,6 +178,8 @@ def run_compilers(commands: Sequence[tuple[Sequence[str], Path]]) -> None:
                 _, message = process.communicate(timeout=TIMEOUT)
             if process.returncode != 0:
                 reason = _first_error(message) or f"it ended with {process.returncode}"
+                if os.strerror(errno.ENOSPC) in message:
+                    raise BrokenToolError(f"the compiler cannot write its files: {reason}")
                 _require_working_compiler(command, environment)
                 raise BuildError(reason)
             _require_output(command[0], target)

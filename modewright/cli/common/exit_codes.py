@@ -28,8 +28,8 @@ MAX_SHOWN = 100
 USAGE_ERROR: Any = typer.BadParameter.__mro__[1]
 """The base class of all usage errors; typer contains its own copy of click."""
 EXIT_CODES = """Exit codes: 0 done; 1 the spec or data has problems, a check failed, lock-step
-differs; 2 wrong usage; 3 a tool is missing (its install line is printed); 4 a defect of
-modewright (one line and a report file); 130 interrupted; 143 ended by SIGTERM."""
+differs; 2 wrong usage; 3 a tool is missing (its install line is printed) or does not work; 4 a
+defect of modewright (one line and a report file); 130 interrupted; 143 ended by SIGTERM."""
 """The text about exit codes below the help of each command."""
 
 
