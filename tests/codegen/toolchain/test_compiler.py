@@ -139,7 +139,7 @@ def test_a_full_disk_of_the_compiler_is_told(
 ) -> None:
     text = "#!/bin/sh\necho 'error: cannot write: No space left on device' >&2\nexit 1\n"
     monkeypatch.setenv("CC", str(script(tmp_path / "cc", text)))
-    with pytest.raises(BrokenToolError, match="cannot write its files: .*No space left on device"):
+    with pytest.raises(BrokenToolError, match=r"cannot write its files: .*No space left on device"):
         compare(heater_tape())
 
 
