@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from codegen.toolchain.compiler import FLAGS, convert_process_errors
+from codegen.toolchain.compiler import FLAGS, BuildError, convert_process_errors
 from codegen.toolchain.external_tools import output_of
 
 SANITIZERS = "address,undefined,float-divide-by-zero,float-cast-overflow"
@@ -46,11 +46,11 @@ def run_sanitised(
     """Run a sanitised program in its folder and return its error output with its first error.
 
     `findings` has at most one text: the first line with one of ERROR_MARKERS, from its last slash
-    on; without such a line, a nonzero exit code. Leaks are not searched. Raises BuildError if the
-    program does not start, and after `timeout` seconds.
+    on; without such a line, a nonzero exit code. Leaks are not searched. Raises
+    BrokenToolError if the program does not start, and BuildError after `timeout` seconds.
     """
     options = os.environ | {"ASAN_OPTIONS": "detect_leaks=0"}
-    with convert_process_errors("the compiled program"):
+    with convert_process_errors("the compiled program", BuildError):
         done = subprocess.run(
             [str(app), *arguments],
             cwd=app.parent,

@@ -15,6 +15,7 @@ from codegen.toolchain.compiler import (
     compiler_version,
     find_compiler,
     flags_at_level,
+    load_shared_library,
 )
 from codegen.toolchain.templates import render
 from language.text.temporary_files import temporary_folder
@@ -69,7 +70,7 @@ def _compile_recursion(states: int, outputs: int) -> Any:
         )
         key = key_of([source], [*find_compiler(), *FLAGS], compiler_version())
         path = get_or_build(key, lambda made: compile_program([source], made, FLAGS), source.parent)
-        function = ctypes.CDLL(str(path)).modewright_gains
+        function = load_shared_library(path).modewright_gains
     pointer, whole = ctypes.c_void_p, ctypes.c_long
     function.argtypes = [*[pointer] * 5, whole, whole, ctypes.c_double, pointer, pointer]
     function.restype = whole

@@ -36,6 +36,7 @@ from codegen.toolchain.compiler import (
     find_compiler,
     flags_at_level,
     has_gcc_vectors,
+    load_shared_library,
 )
 from codegen.toolchain.templates import render
 from language.ir.program import Program, unqualified_name
@@ -70,10 +71,10 @@ def _external_interface(program: Program, step_program: Program) -> tuple[object
 def load_predictor_library(path: Path) -> Any:
     """Load the shared library of a predictor and declare the types of its four functions.
 
-    They are those of codegen/templates/predictor/predictor.c.jinja. Raises OSError if it cannot be
-    loaded.
+    They are those of codegen/templates/predictor/predictor.c.jinja. Raises
+    BrokenToolError if it cannot be loaded.
     """
-    library = ctypes.CDLL(str(path))
+    library = load_shared_library(path)
     pointer, whole = ctypes.c_void_p, ctypes.c_long
     library.modewright_differences.argtypes = [
         *(pointer, pointer, ctypes.c_int, whole),

@@ -23,7 +23,12 @@ from codegen.passes.range_violation_flags import (
 )
 from codegen.simulator.simulator_library import SHARED_LIBRARY_FLAGS, build_library
 from codegen.toolchain.build_cache import get_or_build, key_of
-from codegen.toolchain.compiler import FLAGS, compiler_version, find_compiler
+from codegen.toolchain.compiler import (
+    FLAGS,
+    compiler_version,
+    find_compiler,
+    load_shared_library,
+)
 from codegen.toolchain.templates import render
 from language.ir.printer import digest
 from language.ir.program import Program
@@ -164,7 +169,7 @@ def _load_stepper(stepper_key: _StepperKey, flags: tuple[str, ...]) -> LoadedSte
         sources = sorted(folder.glob("*.c"))
         key = key_of(sources, [*find_compiler(), *flags, *SHARED_LIBRARY_FLAGS], compiler_version())
         path = get_or_build(key, lambda target: build_library(sources, target, flags, None), folder)
-        library = ctypes.CDLL(str(path))
+        library = load_shared_library(path)
     library.stepper_run.argtypes = [ctypes.c_void_p, ctypes.c_int32]
     library.stepper_run.restype = None
     library.stepper_size.restype = ctypes.c_int64

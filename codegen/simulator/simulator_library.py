@@ -20,6 +20,7 @@ from codegen.toolchain.compiler import (
     FLAGS,
     compiler_version,
     find_compiler,
+    load_shared_library,
     run_compiler,
     run_compilers,
 )
@@ -122,7 +123,7 @@ class SimulatorLibrary:
         self.columns = tuple(column_positions(assembly))
         self.width = row_width(assembly)
         self.lanes = LANES
-        self._run = ctypes.CDLL(str(path)).run_variants
+        self._run = load_shared_library(path).run_variants
         self._run.argtypes = [Pointer, Pointer, Int64, Int64]
         self._run.restype = None
 

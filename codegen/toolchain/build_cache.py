@@ -6,16 +6,25 @@ is closed to others (mode 0700). Any other folder is not used, and programs are 
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import logging
 import os
+import shutil
 import stat
+import tempfile
 import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
-from language.text.temporary_files import write_atomically
+from language.text.regular_file import read_regular_bytes
+from language.text.temporary_files import (
+    TEMPORARY_PREFIX,
+    require_temporary_space,
+    write_atomically,
+)
 
 CACHE_VARIABLE = "MODEWRIGHT_CACHE"
 """The environment variable with the folder of the cache."""
@@ -41,12 +50,28 @@ def cache_folder() -> Path:
     """Return the folder of the cache: $MODEWRIGHT_CACHE, else the user's default.
 
     The latter is `modewright` in $XDG_CACHE_HOME if that is an absolute path, else in `~/.cache`.
-    Nothing is created. Raises RuntimeError without a home folder.
+    A user without a home folder has a private temporary folder, until the process ends; otherwise
+    nothing is created. Raises OSError if that folder cannot be created.
     """
     if given := os.environ.get(CACHE_VARIABLE):
         return Path(given)
     base = os.environ.get("XDG_CACHE_HOME", "")
-    return Path(base if os.path.isabs(base) else Path.home() / ".cache") / "modewright"
+    if os.path.isabs(base):
+        return Path(base) / "modewright"
+    try:
+        return Path.home() / ".cache" / "modewright"
+    except RuntimeError:  # neither HOME nor an entry of the user in the list of users
+        return _temporary_cache()
+
+
+@cache
+def _temporary_cache() -> Path:
+    """Return a temporary folder, the same at each call, which is removed when the process ends."""
+    require_temporary_space()
+    folder = Path(tempfile.mkdtemp(prefix=f"{TEMPORARY_PREFIX}cache-"))
+    log.info("there is no home folder; programs are kept in %s until the end", folder)
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
 
 
 def cache_fault(folder: Path) -> str:
@@ -88,7 +113,7 @@ def _locate_folder(subfolder: str) -> tuple[Path, str]:
         if subfolder and not fault:
             folder /= subfolder
             fault = cache_fault(folder)
-    except (OSError, RuntimeError) as error:  # no home folder
+    except OSError as error:  # no home folder and no temporary folder
         return Path(), str(error)
     return folder, fault
 
@@ -151,8 +176,8 @@ def _is_valid(target: Path) -> bool:
     """Tell whether a cached program belongs to the user, is executable and is intact."""
     try:
         status = target.lstat()
-        expected_digest = _digest_file(target).read_text()
-        data = target.read_bytes()
+        expected_digest = read_regular_bytes(_digest_file(target)).decode()
+        data = read_regular_bytes(target)
     except (OSError, UnicodeDecodeError):
         return False
     is_own = stat.S_ISREG(status.st_mode) and status.st_uid == os.getuid()

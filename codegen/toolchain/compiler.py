@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
+import errno
+import itertools
 import os
 import shlex
 import shutil
@@ -12,7 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import TypedDict
 
-from language.text.diagnostic import MissingToolError
+from language.text.diagnostic import BrokenToolError, MissingToolError
 from language.text.temporary_files import temporary_folder
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno")
@@ -59,19 +62,25 @@ class BuildError(Exception):
     """
 
 
-@contextmanager
-def convert_process_errors(name: str) -> Iterator[None]:
-    """Return a context that raises BuildError for a process that does not start or end in time.
+TRIAL_SOURCE = "int main(void)\n{\n    return 0;\n}\n"
+"""A program that each C compiler compiles; one that does not is broken."""
 
-    `name` is the subject of the message, like "the compiler". Converted are OSError and
-    subprocess.TimeoutExpired; other exceptions leave the context unchanged.
+
+@contextmanager
+def convert_process_errors(
+    name: str, timeout_error: type[Exception] = BrokenToolError
+) -> Iterator[None]:
+    """Return a context that raises an error for a process that does not start or end in time.
+
+    `name` is the subject of the message, like "the compiler". An OSError becomes BrokenToolError,
+    subprocess.TimeoutExpired becomes `timeout_error`; other exceptions leave the context unchanged.
     """
     try:
         yield
     except subprocess.TimeoutExpired as error:
-        raise BuildError(f"{name} was not done after {error.timeout:g} s") from None
+        raise timeout_error(f"{name} was not done after {error.timeout:g} s") from None
     except OSError as error:
-        raise BuildError(f"{name} does not run: {error}") from None
+        raise BrokenToolError(f"{name} does not run: {error}") from None
 
 
 @contextmanager
@@ -89,9 +98,15 @@ def find_compiler(name: str | None = None) -> list[str]:
     """Return the command of the C compiler: `name`, else $CC, else the first of cc, gcc and clang.
 
     `name` and $CC are split into words like a shell command. Raises MissingToolError if the first
-    word is not an installed program.
+    word is not an installed program, and BrokenToolError if the text is no shell command.
     """
-    requested = shlex.split(name or os.environ.get("CC", ""))
+    text = name or os.environ.get("CC", "")
+    try:
+        requested = shlex.split(text)
+    except ValueError as error:
+        raise BrokenToolError(
+            f"the C compiler `{text}` is no command: {error}; set CC to a command like `gcc`"
+        ) from None
     for candidate in [requested] if requested else [["cc"], ["gcc"], ["clang"]]:
         if shutil.which(candidate[0]):
             return candidate
@@ -109,8 +124,8 @@ def flags_at_level(level: str) -> tuple[str, ...]:
 def compiler_version(name: str | None = None) -> str:
     """Return `path: line`: the resolved path of the compiler, the first line of its version text.
 
-    The exit code is ignored. `name` is that of `find_compiler`. Raises MissingToolError; BuildError
-    if it cannot be started or does not end in TIMEOUT seconds.
+    The exit code is ignored. `name` is that of `find_compiler`. Raises MissingToolError;
+    BrokenToolError if it cannot be started or does not end in TIMEOUT seconds.
     """
     command = find_compiler(name)
     with convert_process_errors(f"the C compiler `{command[0]}`"):
@@ -132,8 +147,9 @@ def compile_program(sources: Sequence[Path], target: Path, flags: Sequence[str] 
 def run_compiler(command: Sequence[str], target: Path) -> None:
     """Run a compiler command with `-o target` appended.
 
-    Raises BuildError for a nonzero exit code, with its output from the first error on, if it does
-    not start, and after TIMEOUT seconds. Warnings are dropped.
+    Raises BuildError for a nonzero exit code, with its output from the first error on. Raises
+    BrokenToolError for a compiler that does not compile TRIAL_SOURCE either, does not start, makes
+    no file, has no space for its files, or is not done after TIMEOUT seconds. Warnings are dropped.
     """
     run_compilers([(command, target)])
 
@@ -141,11 +157,11 @@ def run_compiler(command: Sequence[str], target: Path) -> None:
 def run_compilers(commands: Sequence[tuple[Sequence[str], Path]]) -> None:
     """Run compiler commands at the same time, each with `-o` and its target appended.
 
-    Raises BuildError like `run_compiler` for the first command of the sequence that fails; the
-    other processes are killed. TIMEOUT counts for each process that is waited for.
+    Raises the errors of `run_compiler` for the first command of the sequence that fails; the other
+    processes are killed. TIMEOUT counts for each process that is waited for.
     """
     with scratch_environment() as environment, ExitStack() as stack:
-        running = []
+        running: list[subprocess.Popen[str]] = []
         for command, target in commands:
             with convert_process_errors("the compiler"):
                 process = subprocess.Popen(
@@ -157,13 +173,61 @@ def run_compilers(commands: Sequence[tuple[Sequence[str], Path]]) -> None:
                 )
             running.append(stack.enter_context(process))
             stack.callback(process.kill)
-        for process in running:
+        for process, (command, target) in zip(running, commands, strict=True):
             with convert_process_errors("the compiler"):
                 _, message = process.communicate(timeout=TIMEOUT)
             if process.returncode != 0:
-                raise BuildError(
-                    _first_error(message) or f"the compiler ended with {process.returncode}"
-                )
+                reason = _first_error(message) or f"it ended with {process.returncode}"
+                if os.strerror(errno.ENOSPC) in message:
+                    raise BrokenToolError(f"the compiler cannot write its files: {reason}")
+                _require_working_compiler(command, environment)
+                raise BuildError(reason)
+            _require_output(command[0], target)
+
+
+def _require_working_compiler(command: Sequence[str], environment: Mapping[str, str]) -> None:
+    """Raise BrokenToolError if the compiler of a command does not compile TRIAL_SOURCE.
+
+    The compiler consists of the words before the first option. The program is compiled, not linked,
+    because a cross compiler needs more options to link.
+    """
+    compiler = list(itertools.takewhile(lambda word: not word.startswith("-"), command))
+    with temporary_folder() as folder:
+        source, target = folder / "trial.c", folder / "trial.o"
+        source.write_text(TRIAL_SOURCE)
+        with convert_process_errors(f"the C compiler `{compiler[0]}`"):
+            done = subprocess.run(
+                [*compiler, "-c", str(source), "-o", str(target)],
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                env=environment,
+                timeout=TIMEOUT,
+                check=False,
+                **AS_TEXT,
+            )
+        if done.returncode:
+            reason = _first_error(done.stderr) or f"it ended with {done.returncode}"
+            raise BrokenToolError(
+                f"the C compiler `{compiler[0]}` compiles no program: {reason}\n"
+                "try another one: CC=gcc, or --compiler where a command has it"
+            )
+        _require_output(compiler[0], target)
+
+
+def _require_output(compiler: str, target: Path) -> None:
+    """Raise BrokenToolError if a compiler that ended without an error has written no file."""
+    if not target.is_file() or not target.stat().st_size:
+        raise BrokenToolError(
+            f"the C compiler `{compiler}` ended without an error, but made no file"
+        )
+
+
+def load_shared_library(path: Path) -> ctypes.CDLL:
+    """Load a compiled shared library. Raises BrokenToolError if the system does not load it."""
+    try:
+        return ctypes.CDLL(str(path))
+    except OSError as error:
+        raise BrokenToolError(f"what the C compiler made cannot be loaded: {error}") from None
 
 
 def run_executable(
@@ -171,11 +235,11 @@ def run_executable(
 ) -> bytes:
     """Run an executable with input records as its standard input; return its standard output.
 
-    `extra_environment` is added to the environment. Raises BuildError for a nonzero exit code, if
-    it does not start, and after TIMEOUT seconds.
+    `extra_environment` is added to the environment. Raises BuildError for a nonzero exit code and
+    after TIMEOUT seconds, and BrokenToolError if it does not start.
     """
     environment = {**os.environ, **(extra_environment or {})}
-    with convert_process_errors("the compiled program"):
+    with convert_process_errors("the compiled program", BuildError):
         done = subprocess.run(
             [str(target)], input=records, capture_output=True, env=environment, timeout=TIMEOUT
         )
@@ -209,7 +273,7 @@ def _has_gcc_vectors(command: tuple[str, ...]) -> bool:
             result = subprocess.run(
                 query, input="", capture_output=True, timeout=TIMEOUT, check=False, **AS_TEXT
             )
-    except BuildError:
+    except BrokenToolError:
         return False
     macros = {line.split()[1] for line in result.stdout.splitlines() if line.startswith("#define ")}
     return {"__GNUC__", "__x86_64__"} <= macros and "__clang__" not in macros

@@ -55,10 +55,10 @@ def run_tool(
     """Run a tool in a folder and return the completed process, whatever its exit code.
 
     Its output is captured as text. `extra_environment` is added to the environment. Raises
-    MissingToolError; BuildError if it does not start, and after TOOL_TIMEOUT seconds.
+    MissingToolError; BrokenToolError if it does not start, and after TOOL_TIMEOUT seconds.
     """
     tool, *words = command
-    with convert_process_errors(tool), scratch_environment() as environment:
+    with scratch_environment() as environment, convert_process_errors(tool):
         return subprocess.run(
             [require_tool(tool), *words],
             cwd=folder,
@@ -75,8 +75,8 @@ def output_of(
 ) -> str:
     """Return the standard output of a tool that is run in a folder.
 
-    `extra_environment` is added to the environment. Raises MissingToolError; BuildError with its
-    error output for a nonzero exit code, and after TOOL_TIMEOUT seconds.
+    `extra_environment` is added to the environment. Raises the errors of `run_tool`; BuildError
+    with its error output for a nonzero exit code.
     """
     done = run_tool(command, folder, extra_environment)
     if done.returncode:

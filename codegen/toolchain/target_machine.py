@@ -72,7 +72,7 @@ def run_in_qemu(target: Path, records: bytes, options: Sequence[str] = ()) -> by
     with temporary_folder() as folder:
         (folder / "records.in").write_bytes(records)
         command = [emulator, "-M", BOARD, *headless, *semihosting, *options, "-kernel", str(target)]
-        with convert_process_errors("the emulated program"):
+        with convert_process_errors("the emulated program", BuildError):
             done = subprocess.run(
                 command, cwd=folder, capture_output=True, timeout=TIMEOUT, stdin=subprocess.DEVNULL
             )

@@ -19,6 +19,7 @@ from language.model.system import RecordingMap
 from language.text.diagnostic import Problems
 from language.text.document import ScalarNode
 from language.text.project_boundary import path_exists, project_root_of, require_inside_project
+from language.text.regular_file import open_regular_file
 
 DATABASE_SUFFIXES = (".dbc", ".arxml", ".kcd", ".sym")
 """Suffixes of files that describe CAN messages; the first is suggested."""
@@ -207,7 +208,8 @@ def _read_database(
 ) -> Sequence[Any]:
     """Return the messages of a database; a file that cannot be understood is reported."""
     try:
-        data = path.read_bytes()
+        with open_regular_file(path) as file:
+            data = file.read()
     except OSError as error:
         label = f"`{written.text}` cannot be read: {error.strerror or error}"
         problems.error("unreadable", written.span, label)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-import stat
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
 from language.text.diagnostic import Problem, Source, Span, SpecError
+from language.text.regular_file import NOT_REGULAR, open_regular_file
 
 MAX_BYTES = 512 * 1024 * 1024
 """Largest size of a recording, after decompression."""
@@ -104,18 +104,17 @@ def require_size(path: Path, source: Source) -> None:
 
 
 def require_regular_file(path: Path, source: Source) -> None:
-    """Raise SpecError for a pipe or a device, which may be endless and can be read only once.
+    """Raise SpecError for a folder, and for a pipe or a device, which may be endless.
 
-    Directories and missing files pass; the reader reports them.
+    Files that are missing or may not be read pass; the reader reports them.
     """
     try:
-        mode = path.stat().st_mode
-    except OSError:
-        return  # the reader reports it
-    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
-        raise unreadable_error(
-            source, "read: it is a pipe or a device", "write it into a file first"
-        )
+        open_regular_file(path).close()
+    except OSError as error:
+        if error.strerror == NOT_REGULAR:
+            raise unreadable_error(
+                source, f"read: {NOT_REGULAR}", "write its content into a file first"
+            ) from None
 
 
 def unreadable_error(source: Source, action: str, help: str = "") -> SpecError:

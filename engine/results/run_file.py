@@ -25,6 +25,7 @@ from engine.results.sampled_run import Event, SignalArray
 from engine.results.trajectory import TIME_HEADER, Trajectory, column_headers
 from language.overlays.expand_document import display_path
 from language.text.diagnostic import Problem, Source, Span, SpecError
+from language.text.regular_file import open_regular_file
 
 FORMATS = (".csv", ".parquet")
 """Suffixes of run files."""
@@ -234,8 +235,11 @@ def _refuse_number(text: str) -> float:
 def _read_side(path: Path) -> SideData:
     """Read a side file. Raises SpecError if it is unreadable or of another version."""
     try:
-        text = path.read_text("utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+        text = _read_text(path)
+    except OSError as error:
+        label = f"this side file cannot be read: {error.strerror or error}"
+        raise _read_error(path, "unreadable", label) from None
+    except UnicodeDecodeError as error:
         raise _read_error(path, "form", f"this side file cannot be read: {error}") from None
     side = _parse_side(text, path)
     if not isinstance(side, dict) or side.get("modewright") != FORMAT_VERSION:
@@ -246,7 +250,7 @@ def _read_side(path: Path) -> SideData:
 def _read_csv(path: Path) -> tuple[list[str], list[str], list[SignalArray]]:
     """Return the names, units and arrays of the columns of a CSV. Raises SpecError."""
     try:
-        rows = list(csv.reader(io.StringIO(path.read_text("utf-8")), strict=True))
+        rows = list(csv.reader(io.StringIO(_read_text(path)), strict=True))
     except OSError as error:
         raise _read_error(path, "unreadable", f"the run cannot be read: {error.strerror}") from None
     except (UnicodeDecodeError, csv.Error) as error:
@@ -262,6 +266,12 @@ def _read_csv(path: Path) -> tuple[list[str], list[str], list[SignalArray]]:
             raise _read_error(path, "row", label, line=number)
     names, units = _names_and_units(path, rows[0])
     return names, units, [_parse_column(path, rows, k) for k in range(len(names))]
+
+
+def _read_text(path: Path) -> str:
+    """Return the text of a UTF-8 file. Raises OSError and UnicodeDecodeError."""
+    with io.TextIOWrapper(open_regular_file(path), "utf-8") as file:
+        return file.read()
 
 
 def _names_and_units(path: Path, heads: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -310,7 +320,8 @@ def _read_parquet(path: Path) -> Trajectory:
     """Read a trajectory from Parquet. Raises SpecError, MissingToolError."""
     arrow = import_pyarrow("Parquet", "; or write .csv")
     try:
-        table = arrow.parquet.read_table(path)
+        with open_regular_file(path) as file:
+            table = arrow.parquet.read_table(file)
     except OSError as error:
         label = f"the run cannot be read: {error.strerror or error}"
         raise _read_error(path, "unreadable", label) from None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import heapq
 import itertools
 import math
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 
@@ -14,6 +15,13 @@ from language.text.diagnostic import Problem, SpecError
 
 MAX_INSTANTS = 100_000_000
 """Largest number of ticks, samples and rows of a run: about an hour of interpretation."""
+
+LARGE_ROW_COUNT = 10_000_000
+"""Number of recorded rows above which a run is announced: 80 MB for each signal."""
+
+
+class LargeRunWarning(UserWarning):
+    """A run records so many rows that it takes long and may need more memory than there is."""
 
 
 class TimeGrid:
@@ -118,11 +126,19 @@ class Schedule:
         return [n for n, grids in self.captures.items() if any(grid.has(time) for grid in grids)]
 
     def _require_bounded(self, scenario: Scenario) -> None:
-        """Raise SpecError for more than `MAX_INSTANTS` instants and rows."""
+        """Raise SpecError for more than `MAX_INSTANTS` instants and rows.
+
+        Warns (LargeRunWarning) about more than LARGE_ROW_COUNT rows.
+        """
         count = sum(grid.count(self.horizon) for grid in (self.rows, *self._grids))
         if count > MAX_INSTANTS:
             label = f"the scenario has {count} ticks and rows; at most {MAX_INSTANTS} are run"
             raise SpecError([Problem("range", scenario.span, label, "a shorter `horizon`")])
+        rows = self.rows.count(self.horizon)
+        if rows > LARGE_ROW_COUNT:
+            text = f"{scenario.span}: the run records {rows} rows, {rows * 8 / 1e6:.0f} MB for each"
+            hint = "signal; a longer `every` of `record`, or fewer signals, needs less"
+            warnings.warn(f"{text} {hint}", LargeRunWarning, stacklevel=2)
 
 
 def _sort_unique(times: Sequence[Fraction]) -> list[Fraction]:

@@ -190,3 +190,7 @@ def render_all(problems: Iterable[Problem]) -> str:
 
 class MissingToolError(Exception):
     """An error for a missing program or package; the message says how to install it."""
+
+
+class BrokenToolError(MissingToolError):
+    """An error for an installed program that does not work; the message has the reason."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import re
-import stat
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from language.text.diagnostic import Problem, Problems, Source, Span, SpecError
+from language.text.regular_file import open_regular_file
 
 MAX_BYTES = 4 * 1024 * 1024
 """Largest file that is read [bytes]; a spec written by hand has a few kB."""
@@ -139,14 +140,13 @@ def read_regular_file(path: Path, name: str, max_bytes: int, what: str) -> bytes
     """
     kind = "unreadable"
     try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            label = "the file cannot be read: it is a folder, a pipe or a device"
-        elif status.st_size > max_bytes:
-            kind = "huge"
-            label = f"the file has {status.st_size} bytes; {what} has at most {max_bytes}"
-        else:
-            return path.read_bytes()
+        with open_regular_file(path) as file:
+            data = file.read(max_bytes + 1)
+            if len(data) <= max_bytes:
+                return data
+            size = max(os.fstat(file.fileno()).st_size, len(data))
+        kind = "huge"
+        label = f"the file has {size} bytes; {what} has at most {max_bytes}"
     except OSError as error:
         label = f"the file cannot be read: {error.strerror}"
     except ValueError:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
 
 INVISIBLE_CATEGORIES = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}
 """Unicode categories of characters that are invisible, turn the direction or end a line."""
+TAB_OR_LINE_FEED = re.compile(r"[\t\n]")
+"""The control characters that the output of a command may contain."""
+FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
+"""First characters of the cells of CSV that spreadsheet programs evaluate as formulas."""
 MAX_LINE_LENGTH = 160
 """Longest source line in a message [characters]; longer lines are cropped around the place."""
 
@@ -19,6 +24,31 @@ def escape_invisible(text: str) -> str:
     return "".join(
         _escape(c) if unicodedata.category(c) in INVISIBLE_CATEGORIES else c for c in text
     )
+
+
+def escape_output(text: str) -> str:
+    r"""Return a text of one or more lines as `escape_invisible`, but keep tabs and line feeds.
+
+    Commands print each text through this function, so no text of a user can control the terminal.
+    """
+    if all(part.isprintable() for part in TAB_OR_LINE_FEED.split(text)):
+        return text  # faster
+    return "".join(c if c in "\t\n" else escape_invisible(c) for c in text)
+
+
+def escape_formula(text: str) -> str:
+    """Return the text of a cell of CSV that no spreadsheet program takes for a formula.
+
+    A text that starts with one of FORMULA_STARTS gets a single quote before it. Numbers are
+    unchanged.
+    """
+    if not text.startswith(FORMULA_STARTS):
+        return text
+    try:
+        float(text)
+    except ValueError:
+        return f"'{text}"
+    return text
 
 
 def mask_invisible(text: str) -> str:

@@ -5,6 +5,7 @@ Files are written through them, so that they appear whole or not at all.
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import tempfile
@@ -65,15 +66,26 @@ def write_atomically(path: Path, data: bytes, mode: int = 0o600) -> None:
             raise
 
 
+def require_temporary_space() -> None:
+    """Raise OSError, ENOSPC, if none of the folders for temporary files can be written."""
+    try:
+        tempfile.gettempdir()
+    except FileNotFoundError as error:
+        reason = "no folder for temporary files can be written; free space, or set TMPDIR"
+        raise OSError(errno.ENOSPC, f"{reason} ({error.strerror})") from None
+
+
 @contextmanager
 def temporary_folder() -> Iterator[Path]:
     """Return a context with a new temporary folder, which is removed at the end.
 
-    Signals are postponed while it is created and removed.
+    Signals are postponed while it is created and removed. Raises OSError, ENOSPC if no folder for
+    temporary files can be written.
     """
     folder = None
     try:
         with postpone_signals():
+            require_temporary_space()
             folder = tempfile.TemporaryDirectory(
                 prefix=TEMPORARY_PREFIX, ignore_cleanup_errors=True
             )

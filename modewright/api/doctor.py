@@ -88,10 +88,9 @@ def _check_cache() -> HealthCheck:
 
     try:
         folder = cache_folder()
-    except RuntimeError as error:
-        return HealthCheck(
-            "cache", "fault", str(error), f"set {CACHE_VARIABLE} to a folder of yours"
-        )
+    except OSError as error:
+        hint = f"set {CACHE_VARIABLE} to a folder of yours"
+        return HealthCheck("cache", "fault", str(error), hint)
     if fault := cache_fault(folder):
         return HealthCheck("cache", "fault", fault, f"or set {CACHE_VARIABLE} to a folder of yours")
     count = sum(len(path.name) == 64 for path in folder.iterdir())

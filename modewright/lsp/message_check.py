@@ -26,6 +26,8 @@ from pygls.protocol import (
     default_converter,
 )
 
+from modewright.lsp.message_reader import HeaderError
+
 MAX_CAUSES = 3
 """Largest number of causes in the message of an error."""
 EXACT_TYPES = (str, int, bool)
@@ -119,8 +121,12 @@ class CheckedProtocol(LanguageServerProtocol):
             raise JsonRpcInvalidParams(f"{method}: {_describe_causes(error)}") from None
 
 
-def parse_error(error: ValueError) -> JsonRpcException:
-    """Return the error JsonRpcParseError (-32700) for a message that is no JSON."""
+def parse_error(error: Exception) -> JsonRpcException:
+    """Return the error JsonRpcParseError (-32700) for a message without valid header or JSON."""
+    if isinstance(error, HeaderError):
+        return JsonRpcParseError(f"the message cannot be read: {error}")
+    if isinstance(error, RecursionError):
+        return JsonRpcParseError("the message is nested too deeply")
     return JsonRpcParseError(f"the message is no JSON: {error}")
 
 

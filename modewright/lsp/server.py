@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import logging
+import sys
+import threading
 from importlib.metadata import version
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from lsprotocol import types
 from pygls.exceptions import JsonRpcException, JsonRpcInvalidParams
+from pygls.io_ import StdoutWriter
 from pygls.lsp.server import LanguageServer
 
 from language.text.diagnostic import SpecError
@@ -16,6 +20,7 @@ from modewright.editing.formatter import format_text
 from modewright.lsp.completion import complete
 from modewright.lsp.hover import hover, reference_at
 from modewright.lsp.message_check import CheckedProtocol, parse_error, strict_converter
+from modewright.lsp.message_reader import MessageReader
 from modewright.lsp.open_documents import OpenDocuments
 from modewright.lsp.outline import outline
 from modewright.lsp.positions import range_of
@@ -44,12 +49,39 @@ class SpecServer(LanguageServer):
             converter_factory=strict_converter,
         )
 
-    def report_server_error(self, error: Exception, source: Any) -> None:
-        """Answer a message that is no JSON; show other errors in the editor."""
-        if source is JsonRpcException and isinstance(error, ValueError):
-            self.protocol.refuse_message(None, parse_error(error))
-        else:
-            super().report_server_error(error, source)
+    def start_io(self, requests: BinaryIO | None = None, responses: BinaryIO | None = None) -> None:
+        """Answer the messages of a stream until `exit`, its end, or an interrupt.
+
+        The loop of pygls is not used, because it ignores a message with an invalid header and all
+        messages after it.
+        """
+        self._stop_event = threading.Event()
+        self.protocol.set_writer(StdoutWriter(responses or sys.stdout.buffer))
+        try:
+            asyncio.run(self._answer_messages(MessageReader(requests or sys.stdin.buffer)))
+        except (BrokenPipeError, KeyboardInterrupt, SystemExit):
+            pass
+        finally:
+            self.shutdown()
+
+    async def _answer_messages(self, reader: MessageReader) -> None:
+        """Answer the messages of a reader; those without valid header or JSON get an error."""
+        loop = asyncio.get_running_loop()
+        assert self._stop_event is not None
+        while not self._stop_event.is_set():
+            try:
+                body = await loop.run_in_executor(self.thread_pool, reader.read_body)
+                if body is None:
+                    return
+                message = json.loads(body, object_hook=self.protocol.structure_message)
+            except (ValueError, RecursionError) as error:
+                self.protocol.refuse_message(None, parse_error(error))
+                continue
+            try:
+                self.protocol.handle_message(message)
+            except Exception as error:
+                logging.getLogger("pygls.server").exception("a message cannot be handled")
+                self.report_server_error(error, JsonRpcException)
 
     def shutdown(self) -> None:
         """Stop the server without waiting for the thread that reads messages."""

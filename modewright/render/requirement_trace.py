@@ -15,6 +15,7 @@ from expectation.requirement_trace import (
     TracedRequirement,
     Verification,
 )
+from language.text.sanitise import escape_formula
 from modewright.render.pluralisation import pluralise
 from modewright.runtime.json_format import format_entry
 
@@ -77,7 +78,8 @@ def trace_json(trace: RequirementTrace) -> dict[str, Any]:
 def trace_csv(trace: RequirementTrace) -> str:
     """Return a trace as CSV with the columns HEADINGS and a row for each pair of place and test.
 
-    A requirement without places or without tests has empty cells there, but at least one row.
+    A requirement without places or without tests has empty cells there, but at least one row. No
+    cell is a formula of a spreadsheet (`escape_formula`).
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -93,7 +95,7 @@ def trace_csv(trace: RequirementTrace) -> str:
                 test = ("",) * 3
                 if proof:
                     test = (_test_name(proof), proof.place, VERDICT_TEXTS[proof.passed])
-                writer.writerow([each.name, each.state, *spec, *test])
+                writer.writerow(map(escape_formula, (each.name, each.state, *spec, *test)))
     return text.getvalue()
 
 

@@ -15,6 +15,7 @@ from codegen.toolchain.templates import render_html
 from diagnosis import report as diagnosis_report
 from language.expressions.units import display_unit
 from language.text.arguments import PathText, to_path
+from language.text.regular_file import open_regular_file
 from modewright.render.sensitivity import DESIGN_UNITS, incomplete_index_notes, sort_indices
 from modewright.render.study import failure_texts, format_number, interval_text
 from sweep.analysis.plots import draw_pictures
@@ -197,11 +198,13 @@ def _variant_rows(table: StudyTable, places: Sequence[int], last: Sequence[str])
     parquet, first = import_arrow().parquet, 0
     found: dict[int, dict[str, Any]] = {}
     for path in table.store.paths():
-        count = parquet.read_metadata(path).num_rows
-        own = [place for place in places if first <= place < first + count]
-        if own:
-            read = parquet.read_table(path, columns=names).take([p - first for p in own])
-            found.update(zip(own, read.to_pylist(), strict=True))
+        with open_regular_file(path) as file:
+            blocks = parquet.ParquetFile(file)
+            count = blocks.metadata.num_rows
+            own = [place for place in places if first <= place < first + count]
+            if own:
+                read = blocks.read(columns=names).take([p - first for p in own])
+                found.update(zip(own, read.to_pylist(), strict=True))
         first += count
     return [[_cell(found[place][name], columns.get(name)) for name in names] for place in places]
 

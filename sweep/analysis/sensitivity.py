@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.results.array_types import Reals
+from language.text.sanitise import escape_formula
 from sweep.analysis.confidence_interval import Interval
 from sweep.analysis.summary import group_values
 from sweep.definition.measure import StoreColumn
@@ -91,7 +92,7 @@ class Sensitivity:
         writer.writerow([*groups, "measure", "unit", "name", *names, *ends, "used", "count"])
         for one in self.indices:
             ends = [str(end) for pair in one.intervals.values() for end in pair or ("", "")]
-            head = [*one.group.values(), one.measure, one.unit, one.name]
+            head = [*map(escape_formula, one.group.values()), one.measure, one.unit, one.name]
             values = ["" if math.isnan(value) else value for value in one.values.values()]
             writer.writerow([*head, *values, *ends, one.used, one.count])
         return text.getvalue()

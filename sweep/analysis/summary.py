@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.results.array_types import Reals
+from language.text.sanitise import escape_formula
 from sweep.analysis.confidence_interval import (
     Interval,
     interval_of_mean,
@@ -169,12 +170,18 @@ class Summary:
             own |= _interval_columns("mean", line.mean_interval) | _interval_columns(
                 "median", line.median_interval
             )
-            writer.writerow({**line.group, **own, "draws": line.draws})
+            writer.writerow({**_group_cells(line), **own, "draws": line.draws})
         for rate in self.rates:
             own = {"measure": rate.measure, "unit": "1", "count": rate.count, "draws": rate.draws}
             own |= {"hits": rate.hits, "share": rate.share if rate.count else ""}
-            writer.writerow({**rate.group, **own, **_interval_columns("share", rate.interval)})
+            share = _interval_columns("share", rate.interval)
+            writer.writerow({**_group_cells(rate), **own, **share})
         return text.getvalue()
+
+
+def _group_cells(line: SummaryLine | Rate) -> dict[str, str]:
+    """Return the group of a line as cells of CSV."""
+    return {name: escape_formula(text) for name, text in line.group.items()}
 
 
 def _interval_columns(name: str, interval: Interval) -> dict[str, float]:

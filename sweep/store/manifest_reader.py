@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from language.expressions.name_rules import NAME_PATTERN
+from language.text.regular_file import read_regular_bytes
 from language.text.sanitise import escape_invisible, truncate
 from sweep.definition.description import Description
 from sweep.definition.measure import StoreColumn
@@ -33,7 +34,7 @@ def read_manifest(folder: Path) -> Manifest:
     version, or has an invalid entry. Blocks are not read.
     """
     try:
-        data = json.loads((folder / MANIFEST_NAME).read_text("utf-8"))
+        data = json.loads(read_regular_bytes(folder / MANIFEST_NAME).decode("utf-8"))
         if isinstance(data, dict) and data.get("modewright", STORE_FORMAT) != STORE_FORMAT:
             label = "these results are in a form that is not known here"
             raise store_error(folder, label, "run the study into another folder")
@@ -42,7 +43,8 @@ def read_manifest(folder: Path) -> Manifest:
         label = "there are no results of a study here"
         raise store_error(folder, label, "modewright sweep STUDY --out DIR") from None
     except (OSError, ValueError, RecursionError) as error:
-        label = f"`{MANIFEST_NAME}` cannot be read: {error}"
+        reason = error.strerror if isinstance(error, OSError) else None
+        label = f"`{MANIFEST_NAME}` cannot be read: {reason or error}"
         hint = "put back what modewright has written; the blocks are as they were"
         raise store_error(folder, label, hint) from None
 

@@ -8,6 +8,7 @@ Hence a file with a final name is complete, also after a crash.
 from __future__ import annotations
 
 import dataclasses
+import errno
 import os
 import re
 from collections.abc import Iterator, Sequence
@@ -16,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from language.text.diagnostic import Problems, SpecError
+from language.text.regular_file import open_lock_file, read_regular_bytes
 from sweep.store.block_file import block_file_fault, encode_block, import_arrow
 from sweep.store.manifest import MANIFEST_NAME, Manifest, encode_manifest, file_span, store_error
 from sweep.store.manifest_reader import read_manifest
@@ -59,7 +61,7 @@ class Store:
         whole, damaged, problems = [], [], Problems()
         for path, block in self._files():
             try:
-                fault = block_file_fault(self.manifest, block, path.read_bytes())
+                fault = block_file_fault(self.manifest, block, read_regular_bytes(path))
             except OSError as error:
                 problems.error("store", file_span(path), f"this cannot be read: {error.strerror}")
                 continue
@@ -130,7 +132,8 @@ def write_atomically(path: Path, data: bytes) -> None:
     """
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        with part.open("wb") as file:
+        part.unlink(missing_ok=True)  # never write through a link of this name
+        with part.open("xb") as file:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
@@ -211,7 +214,8 @@ def lock_folder(folder: Path) -> Iterator[None]:
     """Lock a folder against writing by other processes; the lock ends with the context or process.
 
     The folder and the file LOCK_NAME in it are created. Raises SpecError if another process has the
-    lock. Systems without fcntl have no lock.
+    lock, and if LOCK_NAME cannot be opened or is a link, a pipe or a device. Systems without fcntl
+    have no lock.
     """
     folder.mkdir(parents=True, exist_ok=True)
     try:
@@ -219,7 +223,14 @@ def lock_folder(folder: Path) -> Iterator[None]:
     except ImportError:  # no such locks on this system
         yield
         return
-    with (folder / LOCK_NAME).open("wb") as file:
+    try:
+        lock = open_lock_file(folder / LOCK_NAME)
+    except OSError as error:
+        is_link = error.errno == errno.ELOOP
+        reason = "it is a link to another file" if is_link else error.strerror
+        label = f"the file `{LOCK_NAME}` of these results cannot be locked: {reason}"
+        raise store_error(folder, label, f"remove `{LOCK_NAME}`, or name another folder") from None
+    with lock as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:

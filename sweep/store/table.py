@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.results.array_types import Reals
+from language.text.regular_file import open_regular_file
 from sweep.definition.measure import StoreColumn
 from sweep.store.block_file import import_arrow
 from sweep.store.row import DONE
@@ -112,8 +113,8 @@ class StudyTable:
 
     def _read_parts(self, name: str) -> list[Any]:
         """Return a column of each block file as a pyarrow array."""
-        parquet = import_arrow().parquet
-        paths = self.store.paths()
-        return [
-            parquet.read_table(path, columns=[name]).column(0).combine_chunks() for path in paths
-        ]
+        parquet, parts = import_arrow().parquet, []
+        for path in self.store.paths():
+            with open_regular_file(path) as file:
+                parts.append(parquet.read_table(file, columns=[name]).column(0).combine_chunks())
+        return parts

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import io
 import json
 from pathlib import Path
@@ -85,6 +86,14 @@ def test_a_trace_is_written_in_every_form(found: RequirementTrace) -> None:
     assert "Trace of latch &lt;1&gt;" in page and page.count("<tr>") == 6
     data = show_trace.trace_json(found)
     assert data["untested"] == ["L-2"] and data["requirements"][1]["text"] == "goes high"
+
+
+def test_a_requirement_is_no_formula_in_csv(found: RequirementTrace) -> None:
+    formula = "=cmd|' /C calc'!A0"
+    first = dataclasses.replace(found.requirements[0], name=formula)
+    trace = dataclasses.replace(found, requirements=(first,))
+    (row,) = csv.DictReader(io.StringIO(show_trace.trace_csv(trace)))
+    assert row["requirement"] == f"'{formula}"
 
 
 def test_the_command_runs_tests_and_is_strict(found: RequirementTrace) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from language.text.diagnostic import MissingToolError
+from language.text.regular_file import open_regular_file
 
 if TYPE_CHECKING:
     from elftools.dwarf.die import DIE
@@ -101,7 +102,7 @@ def read_image(path: Path, types: tuple[str, ...], string_symbols: tuple[str, ..
             "reading an ELF needs pyelftools: pip install 'modewright[elf]'"
         ) from None
     try:
-        file = path.open("rb")
+        file = open_regular_file(path)
     except OSError as error:
         raise ImageError(f"{path}: {error.strerror}") from None
     with file:

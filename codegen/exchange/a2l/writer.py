@@ -144,13 +144,13 @@ def emit_a2l(program: Program, location: ModuleLocation | None = None) -> str:
 
 
 def sanitise_string(text: str) -> str:
-    """Return a text as one line of ASCII that is safe between double quotes in A2L.
+    """Return a text as one line of printable ASCII that is safe between double quotes in A2L.
 
     Other characters become `?`, backslashes `/`, double quotes `'`; white space is collapsed and
     stripped.
     """
-    plain = text.encode("ascii", "replace").decode()
-    return re.sub(r"\s+", " ", plain.replace("\\", "/").replace('"', "'")).strip()
+    line = " ".join(text.split()).replace("\\", "/").replace('"', "'")
+    return re.sub(r"[^ -~]", "?", line)
 
 
 def _common_context(

@@ -31,12 +31,13 @@ def console() -> Console:
     """Return the console for stdout, the same one at each call.
 
     It has no colours in pipes and under NO_COLOR. Its width is PIPE_WIDTH if stdout is no terminal
-    and COLUMNS is not set.
+    and COLUMNS is not set. It escapes invisible characters of texts (`escape_output`).
     """
-    from rich.console import Console  # deferred: the import is slow and --help does not need it
+    # deferred: the import is slow and --help does not need it
+    from modewright.cli.common.escaping_console import EscapingConsole
 
     has_width = sys.stdout.isatty() or "COLUMNS" in os.environ
-    return Console(width=None if has_width else PIPE_WIDTH)
+    return EscapingConsole(width=None if has_width else PIPE_WIDTH)
 
 
 def configure(quiet: bool = False, verbose: bool = False, log_file: Path | None = None) -> None:
@@ -88,11 +89,12 @@ def progress_spinner(description: str) -> Iterator[None]:
     The spinner is hidden if stderr is no terminal or the console is quiet. No duration is logged
     after an exception.
     """
-    from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
+    from modewright.cli.common.escaping_console import EscapingConsole
+
     start = time.monotonic()
-    screen = Console(stderr=True)
+    screen = EscapingConsole(stderr=True)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     is_hidden = not screen.is_terminal or console().quiet
     with Progress(*columns, console=screen, transient=True, disable=is_hidden) as progress:
@@ -110,10 +112,11 @@ def progress_bar(description: str, noun: str) -> Iterator[Callable[[int, int, in
     printed at most each REPORT_INTERVAL; nothing if the console is quiet. The duration is logged at
     the end.
     """
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    screen = Console(stderr=True)
+    from modewright.cli.common.escaping_console import EscapingConsole
+
+    screen = EscapingConsole(stderr=True)
     is_hidden = not screen.is_terminal or console().quiet
     columns = (
         TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[count]}"),
@@ -147,7 +150,7 @@ def report_written_files(files: Sequence[Path]) -> None:
     """Print and log a line `wrote path` for each path, in the given order."""
     for path in files:
         log.info("wrote %s", path)
-        console().print(f"wrote {path}", highlight=False, soft_wrap=True)
+        console().print(f"wrote {path}", highlight=False, markup=False, soft_wrap=True)
 
 
 def _set_formatter(handler: logging.Handler, form: str) -> logging.Handler:

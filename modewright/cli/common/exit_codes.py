@@ -7,14 +7,18 @@ import os
 import sys
 import tempfile
 import traceback
+import warnings
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import typer
 
+from engine.simulation.event_schedule import LargeRunWarning
 from language.text.diagnostic import MissingToolError, SpecError, render_all, sort_problems
 from language.text.sanitise import escape_invisible, truncate
+from modewright.cli.common.escaping_stream import escape_standard_streams
 from modewright.runtime.output_files import OutputError
 from sweep.execution.dask_error import ClusterError
 
@@ -24,8 +28,8 @@ MAX_SHOWN = 100
 USAGE_ERROR: Any = typer.BadParameter.__mro__[1]
 """The base class of all usage errors; typer contains its own copy of click."""
 EXIT_CODES = """Exit codes: 0 done; 1 the spec or data has problems, a check failed, lock-step
-differs; 2 wrong usage; 3 a tool is missing (its install line is printed); 4 a defect of
-modewright (one line and a report file); 130 interrupted; 143 ended by SIGTERM."""
+differs; 2 wrong usage; 3 a tool is missing (its install line is printed) or does not work; 4 a
+defect of modewright (one line and a report file); 130 interrupted; 143 ended by SIGTERM."""
 """The text about exit codes below the help of each command."""
 
 
@@ -35,8 +39,26 @@ def run_with_exit_code(run: Callable[[], object]) -> int:
     The code is the int that `run` returns, else DONE. A usage error gives USAGE, Ctrl-C
     INTERRUPTED, typer.Exit its own code. SpecError, OutputError, ClusterError and an OSError of
     USER_ERRNOS give PROBLEMS, MissingToolError gives TOOL. A closed pipe on stdout gives DONE. Any
-    other Exception gives DEFECT and writes a report file.
+    other Exception gives DEFECT and writes a report file. Meanwhile stdout and stderr escape
+    invisible characters, and warnings of modewright are printed as one line each.
     """
+    with escape_standard_streams(), warnings.catch_warnings():
+        warnings.showwarning = partial(_show_warning, warnings.showwarning)
+        return _run(run)
+
+
+def _show_warning(
+    show_other: Callable[..., None], message: Warning | str, category: type[Warning], *place: Any
+) -> None:
+    """Print a warning of modewright to stderr; pass others to `show_other`."""
+    if issubclass(category, LargeRunWarning):
+        print(f"warning: {message}", file=sys.stderr)
+    else:
+        show_other(message, category, *place)
+
+
+def _run(run: Callable[[], object]) -> int:
+    """Return the exit code of `run_with_exit_code`."""
     try:
         code = run()
         _flush_stdout()
@@ -74,9 +96,15 @@ def run_with_exit_code(run: Callable[[], object]) -> int:
 
 
 def _report_defect(error: Exception) -> int:
-    """Write the report file of an unexpected exception, print its path and return the exit code."""
+    """Write the report file of an unexpected exception, print its path and return the exit code.
+
+    If the file cannot be written, the reason is printed instead.
+    """
     print(f"error: a defect of modewright: {_first_line(error)}", file=sys.stderr)
-    print(f"a report is in {_write_defect_report()}", file=sys.stderr)
+    try:
+        print(f"a report is in {_write_defect_report()}", file=sys.stderr)
+    except OSError as no_report:
+        print(f"no report can be written: {no_report.strerror}", file=sys.stderr)
     return DEFECT
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import stat
+import tempfile
 import time
 from pathlib import Path
 
@@ -262,3 +264,36 @@ def test_the_cache_is_below_the_users_cache_folder(
     monkeypatch.setenv("XDG_CACHE_HOME", "relative")
     monkeypatch.setenv("HOME", str(tmp_path))
     assert cache.cache_folder() == tmp_path / ".cache" / "modewright"
+
+
+def test_a_user_without_a_home_folder_has_a_private_temporary_cache(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def no_home() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    for name in ("MODEWRIGHT_CACHE", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(Path, "home", no_home)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    cache._temporary_cache.cache_clear()
+    try:
+        folder = cache.cache_folder()
+        assert folder.parent == tmp_path and cache.cache_folder() == folder
+        assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+        assert cache.cache_fault(folder) == ""
+    finally:
+        cache._temporary_cache.cache_clear()
+
+
+@pytest.mark.parametrize("name", ["program", "digest"])
+def test_a_pipe_in_the_cache_is_no_program(folder: Path, tmp_path: Path, name: str) -> None:
+    def build(target: Path) -> None:
+        target.write_bytes(b"built")
+        target.chmod(0o700)
+
+    target = cache.get_or_build("a" * 64, build, tmp_path)
+    path = target if name == "program" else target.with_name(f"{target.name}.sha256")
+    path.unlink()
+    os.mkfifo(path)
+    assert cache.get_or_build("a" * 64, build, tmp_path).read_bytes() == b"built"

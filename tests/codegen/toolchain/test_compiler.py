@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -21,7 +22,7 @@ from codegen.toolchain.compiler import (
     run_executable,
 )
 from codegen.toolchain.external_tools import run_tool
-from language.text.diagnostic import MissingToolError
+from language.text.diagnostic import BrokenToolError, MissingToolError
 from lockstep.comparison import compare
 from tests.lockstep.heater import heater, heater_tape
 
@@ -86,17 +87,60 @@ def test_no_compiler_at_all_is_missing_too(tmp_path: Path, monkeypatch: pytest.M
 
 @pytest.mark.parametrize(
     ("text", "message"),
-    [(FAILING, "engine.c:1:2: error: no more ink"), (SILENT, "the compiler ended with 3")],
+    [(FAILING, "engine.c:1:2: error: no more ink"), (SILENT, "it ended with 3")],
     ids=["with a message", "without"],
 )
-def test_a_compiler_that_fails_is_quoted_and_nothing_is_left_behind(
+def test_a_compiler_that_compiles_no_program_is_broken_and_nothing_is_left_behind(
     tmp_path: Path, temporary: Path, monkeypatch: pytest.MonkeyPatch, text: str, message: str
 ) -> None:
     monkeypatch.setenv("CC", str(script(tmp_path / "cc", text)))
-    with pytest.raises(BuildError) as caught:
+    with pytest.raises(BrokenToolError) as caught:
         compare(heater_tape())
-    assert str(caught.value) == message
+    assert f"cc` compiles no program: {message}" in str(caught.value)
     assert list(temporary.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        ("false", "the C compiler `false` compiles no program: it ended with 1"),
+        ("true", "the C compiler `true` ended without an error, but made no file"),
+        ('"', "is no command: No closing quotation; set CC to a command like `gcc`"),
+        ("gcc 'a", "is no command: No closing quotation"),
+    ],
+)
+def test_a_command_that_is_no_compiler_is_broken(
+    monkeypatch: pytest.MonkeyPatch, command: str, message: str
+) -> None:
+    monkeypatch.setenv("CC", command)
+    with pytest.raises(BrokenToolError, match=re.escape(message)):
+        compare(heater_tape())
+
+
+WRITES_NO_PROGRAM = """\
+#!/bin/sh
+while [ $# -gt 1 ]; do [ "$1" = -o ] && { echo text > "$2"; chmod +x "$2"; }; shift; done
+"""
+
+
+def test_what_a_broken_compiler_writes_is_no_defect_of_the_c(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compiler = script(tmp_path / "cc", WRITES_NO_PROGRAM)
+    monkeypatch.setenv("CC", str(compiler))
+    with pytest.raises(BrokenToolError, match=r"does not run: .*Exec format error"):
+        compare(heater_tape())
+    with pytest.raises(BrokenToolError, match="what the C compiler made cannot be loaded"):
+        CompiledStepper(heater())
+
+
+def test_a_full_disk_of_the_compiler_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = "#!/bin/sh\necho 'error: cannot write: No space left on device' >&2\nexit 1\n"
+    monkeypatch.setenv("CC", str(script(tmp_path / "cc", text)))
+    with pytest.raises(BrokenToolError, match=r"cannot write its files: .*No space left on device"):
+        compare(heater_tape())
 
 
 def test_c_that_is_wrong_is_quoted_with_file_and_line(tmp_path: Path) -> None:
@@ -146,11 +190,20 @@ def run_under_sanitizers(folder: Path) -> None:
         compile_a_program,
         compile_a_library,
         step_a_program,
-        run_a_program,
-        run_under_sanitizers,
         lambda folder: run_tool([str(folder / "cc")], folder),
     ],
 )
+def test_a_tool_that_hangs_is_broken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: Callable[[Path], object]
+) -> None:
+    monkeypatch.setenv("CC", str(script(tmp_path / "cc", HANGING)))
+    monkeypatch.setattr("codegen.toolchain.compiler.TIMEOUT", 0.2)
+    monkeypatch.setattr("codegen.toolchain.external_tools.TOOL_TIMEOUT", 0.2)
+    with pytest.raises(BrokenToolError, match=r"was not done after 0\.2 s"):
+        call(tmp_path)
+
+
+@pytest.mark.parametrize("call", [run_a_program, run_under_sanitizers])
 def test_a_program_that_hangs_is_a_build_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: Callable[[Path], object]
 ) -> None:
@@ -171,11 +224,11 @@ def test_a_program_that_hangs_is_a_build_error(
         lambda folder: run_tool([str(folder / "cc")], folder),
     ],
 )
-def test_a_program_that_does_not_start_is_a_build_error(
+def test_a_program_that_does_not_start_is_a_broken_tool(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: Callable[[Path], object]
 ) -> None:
     monkeypatch.setenv("CC", str(script(tmp_path / "cc", "neither a script nor a program")))
-    with pytest.raises(BuildError, match=r"does not run: .*Exec format error"):
+    with pytest.raises(BrokenToolError, match=r"does not run: .*Exec format error"):
         call(tmp_path)
 
 
@@ -184,7 +237,7 @@ def test_the_message_of_a_compiler_may_have_any_bytes(
 ) -> None:
     text = "#!/bin/sh\nprintf 'error: \\344\\n' >&2\nexit 1\n"
     monkeypatch.setenv("CC", str(script(tmp_path / "cc", text)))
-    with pytest.raises(BuildError, match="error: \ufffd"):
+    with pytest.raises(BrokenToolError, match="error: \ufffd"):
         compile_a_program(tmp_path)
 
 

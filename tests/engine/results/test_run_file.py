@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from dataclasses import fields
 from pathlib import Path
@@ -179,3 +180,30 @@ def test_a_frame_without_pandas_tells_what_to_install(monkeypatch: pytest.Monkey
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(MissingToolError, match="pandas"):
         run().frame()
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_a_run_that_is_a_pipe_a_device_or_a_folder_is_refused(ending: str, tmp_path: Path) -> None:
+    pipe, device, folder = (tmp_path / f"{name}.{ending}" for name in ("pipe", "device", "folder"))
+    os.mkfifo(pipe)
+    device.symlink_to("/dev/zero")
+    folder.mkdir()
+    for path in (pipe, device, folder):
+        with pytest.raises(SpecError, match="the run cannot be read: it is a folder, a pipe"):
+            read_run(path)
+
+
+def test_a_side_file_that_is_a_pipe_is_refused(tmp_path: Path) -> None:
+    path = save(run(), tmp_path / "run.csv")
+    side_path(path).unlink()
+    os.mkfifo(side_path(path))
+    with pytest.raises(SpecError, match="this side file cannot be read: it is a folder, a pipe"):
+        read_run(path)
+
+
+@pytest.mark.parametrize("opening", ["[", '{"a":', '[{"b":['])
+def test_a_side_file_that_is_nested_deeply_is_refused(opening: str, tmp_path: Path) -> None:
+    path = save(run(), tmp_path / "run.csv")
+    side_path(path).write_text(opening * 100_000)
+    with pytest.raises(SpecError, match="this side file is nested too deeply"):
+        read_run(path)

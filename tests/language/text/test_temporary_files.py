@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import tempfile
@@ -121,3 +122,13 @@ def test_a_signal_at_any_step_leaves_no_folder(
         if step == "body":
             os.kill(os.getpid(), signal.SIGTERM)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_without_any_folder_for_temporary_files_the_user_is_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.setattr(tempfile, "_candidate_tempdir_list", lambda: ["/proc/nowhere"])
+    with pytest.raises(OSError, match="free space, or set TMPDIR") as caught, temporary_folder():
+        pass
+    assert caught.value.errno == errno.ENOSPC

@@ -215,7 +215,10 @@ def test_a_pipe_is_no_recording(project: Path, capsys: pytest.CaptureFixture[str
         os.mkfifo(project / name)
         assert run(name, "--map", "bench") == 1
         told = capsys.readouterr().err
-        assert f"{name}:1:1: error: the recording cannot be read: it is a pipe or a device" in told
+        assert (
+            f"{name}:1:1: error: the recording cannot be read: it is a folder, a pipe or a device"
+            in told
+        )
 
 
 def test_a_loop_of_links_is_no_recording(project: Path, capsys: pytest.CaptureFixture[str]) -> None:

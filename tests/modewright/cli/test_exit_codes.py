@@ -8,6 +8,7 @@ import re
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -182,6 +183,56 @@ def test_a_missing_compiler_is_3_with_its_install_line(
     monkeypatch.setenv("CC", "no-such-compiler")
     assert run("replay", "estimator", str(TRACE), "--map", "reference_trace") == 3
     assert "apt-get install" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["false", "true", "'"])
+def test_a_compiler_that_does_not_work_is_3_with_the_reason(
+    command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("CC", command)
+    assert run("lockstep", "ev_driveline", "-s", "tip_out") == 3
+    assert f"error: the C compiler `{command}` " in capsys.readouterr().err
+
+
+def test_no_folder_for_temporary_files_is_1_with_the_reason() -> None:
+    code = (
+        "import tempfile\n"
+        "tempfile._candidate_tempdir_list = lambda: ['/proc/nowhere']\n"
+        "from modewright.cli.app import main\n"
+        "main()\n"
+    )
+    command = [sys.executable, "-c", code, "lockstep", "ev_driveline", "-s", "tip_out"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 1, done.stderr
+    assert "free space, or set TMPDIR" in done.stderr and done.stderr.count("\n") == 1
+
+
+def test_a_large_run_is_announced_before_it_begins(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("engine.simulation.simulate._Simulation.run", stop)
+    assert run("new", "warm", "--out", str(tmp_path / "warm")) == 0
+    monkeypatch.chdir(tmp_path / "warm")
+    scenario = "language: 1\nscenario: long\nof: warm\nhorizon: 6 h\nrecord: {every: 1 ms}\n"
+    Path("spec", "long.yaml").write_text(scenario)
+    assert run("simulate", "warm", "-s", "long", "--interpreted") == 130
+    (warning,) = [line for line in capsys.readouterr().err.splitlines() if "warning" in line]
+    assert "the run records 21600001 rows, 173 MB for each signal" in warning
+
+
+def test_a_defect_without_a_folder_for_its_report_is_4(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("seven")
+
+    monkeypatch.setattr(explaining, "explain_spec", broken)
+    monkeypatch.setattr(tempfile, "tempdir", "/proc/nowhere")
+    assert run("explain", "estimator") == 4
+    assert "no report can be written: " in capsys.readouterr().err
 
 
 def test_a_defect_of_ours_is_4_with_a_report(

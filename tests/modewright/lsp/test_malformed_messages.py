@@ -108,10 +108,48 @@ def test_what_is_no_json_is_a_parse_error(talk: LspClient, data: bytes) -> None:
     assert answer["error"]["code"] == -32700 and answer["id"] is None
 
 
+@pytest.mark.parametrize("opening", ["[", '{"a":'])
+def test_a_message_that_is_nested_deeply_is_a_parse_error(talk: LspClient, opening: str) -> None:
+    error = answer_to(talk, opening.encode() * 100_000)["error"]
+    assert error == {"code": -32700, "message": "the message is nested too deeply"}
+    assert talk.request("textDocument/hover", VALID) is None
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"Content-Length: abc\r\n\r\n{}",
+        b"Content-Length: -5\r\n\r\n{}",
+        b"Content-Length: 0\r\n\r\n",
+        b"Content-Length:\r\n\r\n",
+        b"Content-Length: 99999999999999999999\r\n\r\n{}",
+        b"Content-Type: text\r\n\r\n{}",
+        b"no header at all\n\n",
+        b"Content-Length: 1\r\n\r\n{}",
+    ],
+)
+def test_a_message_with_a_wrong_header_is_a_parse_error(talk: LspClient, data: bytes) -> None:
+    answer = answer_to_bytes(talk, data)
+    assert answer["error"]["code"] == -32700 and answer["id"] is None
+    for _ in range(2):
+        assert talk.request("textDocument/hover", VALID) is None
+
+
+@pytest.mark.parametrize("header", [b"content-length:  %d\r\n\r\n", b"\r\nContent-Length: %d\n\n"])
+def test_a_header_may_be_written_in_other_ways(talk: LspClient, header: bytes) -> None:
+    answer = answer_to_bytes(talk, header % 2 + b"[]")
+    assert answer["error"]["code"] == -32600
+
+
 def answer_to(talk: LspClient, data: bytes) -> Message:
     """Send the body of a message, and return the next error."""
+    return answer_to_bytes(talk, b"Content-Length: %d\r\n\r\n%s" % (len(data), data))
+
+
+def answer_to_bytes(talk: LspClient, data: bytes) -> Message:
+    """Send bytes, and return the next error."""
     assert talk.process.stdin
-    talk.process.stdin.write(b"Content-Length: %d\r\n\r\n%s" % (len(data), data))
+    talk.process.stdin.write(data)
     talk.process.stdin.flush()
     while "error" not in (message := talk._receive()):
         pass

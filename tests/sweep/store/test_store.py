@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -17,7 +18,7 @@ from language.text.diagnostic import SpecError
 from sweep.execution.study_run import run_study
 from sweep.store.block_file import block_file_fault
 from sweep.store.manifest import MANIFEST_NAME, seal_of
-from sweep.store.store import Store, read_store
+from sweep.store.store import Store, read_store, write_atomically
 from tests.sweep.example_studies import QUICK_EXECUTOR, make_study
 from tests.sweep.execution.test_study_run import bytes_of
 
@@ -209,7 +210,7 @@ def test_a_block_that_is_a_folder_is_told(out: Path) -> None:
     path = Store(out, read_store(out).manifest).paths()[0]
     path.unlink()
     path.mkdir()
-    with pytest.raises(SpecError, match="this cannot be read: Is a directory"):
+    with pytest.raises(SpecError, match="this cannot be read: it is a folder"):
         read_store(out)
 
 
@@ -227,3 +228,35 @@ def test_a_folder_that_is_refused_keeps_no_lock(tmp_path: Path) -> None:
     with pytest.raises(SpecError, match="something else"):
         run_study(make_study(), tmp_path, QUICK_EXECUTOR)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+@pytest.mark.parametrize("name", ["study.json", "block"])
+def test_a_part_of_the_results_that_is_a_pipe_is_refused(name: str, out: Path) -> None:
+    path = out / name if name != "block" else Store(out, read_store(out).manifest).paths()[0]
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(SpecError, match="cannot be read: it is a folder, a pipe or a device"):
+        read_store(out)
+
+
+def test_a_lock_that_is_a_link_is_refused_and_its_target_is_unchanged(tmp_path: Path) -> None:
+    target, out = tmp_path / "target", tmp_path / "out"
+    target.write_text("content")
+    out.mkdir()
+    (out / ".lock").symlink_to(target)
+    with pytest.raises(SpecError, match=r"`\.lock` .* cannot be locked: it is a link"):
+        run_study(make_study(), out, QUICK_EXECUTOR)
+    (out / ".lock").unlink()
+    (out / ".lock").symlink_to(tmp_path / "absent")
+    with pytest.raises(SpecError, match="it is a link"):
+        run_study(make_study(), out, QUICK_EXECUTOR)
+    assert target.read_text() == "content" and not (tmp_path / "absent").exists()
+
+
+def test_a_temporary_file_is_never_written_through_a_link(tmp_path: Path) -> None:
+    target, path = tmp_path / "target", tmp_path / "file"
+    target.write_text("content")
+    (tmp_path / f".file.{os.getpid()}.part").symlink_to(target)
+    write_atomically(path, b"new")
+    assert (path.read_bytes(), target.read_text()) == (b"new", "content")
+    assert not path.is_symlink()
