@@ -12,6 +12,7 @@ from language.ir.number_type import ROUNDING_FUNCTIONS, NumberType, round_to_flo
 from language.ir.ops import Assign, Binary, Call, Compare, Expr, Item, Ref, Select, Unary, Value
 from language.numerics.function_table import FUNCTIONS_BY_TYPE
 from language.numerics.interpolation import Interpolation
+from language.numerics.payne_hanek import reduction_operations
 
 ARITHMETIC: Mapping[str, Callable[[Any, Any], Any]] = {
     "+": operator.add,
@@ -131,15 +132,19 @@ One further rounding of a result therefore gives the result in float32.
 """
 
 ELEMENTARY_BY_TYPE: Mapping[NumberType, FunctionMap] = {
-    "float64": ELEMENTARY,
+    "float64": {**ELEMENTARY, **reduction_operations("float64")},
     "float32": {
         **ELEMENTARY,
+        **reduction_operations("float32"),
         "pow2": power_of_two_float32,
         "lookup": Interpolation(round_to_float32).lookup,
         "lookup2": Interpolation(round_to_float32).lookup2,
     },
 }
-"""Elementary operations of each number type, before the rounding of their result to the type."""
+"""Elementary operations of each number type, before the rounding of their result to the type.
+
+To those that specs and Programs call they add those that only elementary functions call.
+"""
 
 BINARY_OPERATIONS: Mapping[str, Callable[[Scalar, Scalar], Scalar]] = {
     **ARITHMETIC,
@@ -189,12 +194,12 @@ def evaluate(
 def apply_function(
     function: str, arguments: list[Scalar], number_type: NumberType = "float64"
 ) -> Scalar:
-    """Return the value of an operation in ELEMENTARY or of a function in FUNCTIONS_BY_TYPE.
+    """Return the value of an operation in ELEMENTARY_BY_TYPE or of a function.
 
     The result and each operation of a function are rounded to the number type. Results of functions
     are cached, except with an argument of 0. Raises KeyError for an unknown function.
     """
-    if function in ELEMENTARY:
+    if function in ELEMENTARY_BY_TYPE[number_type]:
         return round_if_real(ELEMENTARY_BY_TYPE[number_type][function](*arguments), number_type)
     values = tuple(arguments)
     if 0.0 in values:  # the cache does not distinguish -0.0 from 0.0
