@@ -24,7 +24,129 @@ float ha_pow2f(float k)
     return result;
 }
 
-/* sine; |x| <= 1000 rad, clamped; error < 0.85 ULP */
+/* 2/pi behind 2 words of zeros, 32 bits a word */
+static const uint32_t two_over_pi[12] = {
+0x00000000U, 0x00000000U, 0xA2F9836EU, 0x4E441529U, 0xFC2757D1U, 0xF534DDC0U, 0xDB629599U, 0x3C439041U,
+0xFE5163ABU, 0xDEBBC561U, 0xB7246E3AU, 0x424DD2E0U
+};
+
+/* The upper 64 bits of a product of 128 bits */
+static uint64_t upper_product(uint64_t a, uint64_t b)
+{
+    const uint64_t mask = 0xFFFFFFFFU;
+    const uint64_t low = (a & mask) * (b & mask);
+    const uint64_t inner = ((a >> 32) * (b & mask)) + (low >> 32);
+    const uint64_t outer = ((a & mask) * (b >> 32)) + (inner & mask);
+
+    return ((a >> 32) * (b >> 32)) + (inner >> 32) + (outer >> 32);
+}
+
+/*
+ * x = head + tail beyond a multiple of pi/2, whose number modulo 4 is returned, for |x| >= 2^9.
+ * The product of x and 2/pi needs only those bits of 2/pi that lead to its lowest two bits before
+ * the point and to 126 bits behind it (Payne and Hanek 1983).
+ */
+static float reduce_far_angle(float x, float *head, float *tail)
+{
+    const uint64_t mask = 0xFFFFFFFFU;
+    const float sign = (x < 0.0F) ? -1.0F : 1.0F;
+    uint32_t bits;
+    uint64_t mantissa;
+    uint32_t exponent;
+    uint32_t place;
+    uint64_t words[6];
+    uint64_t carry = 0U;
+    uint64_t right = 0U; /* the word of 2/pi to the right */
+    uint64_t high;
+    uint64_t low;
+    uint32_t quadrant;
+    int32_t zeros = 0;
+    bool is_above;
+    uint64_t angle;
+
+    (void)memcpy(&bits, &x, sizeof bits);
+    exponent = (uint32_t)(bits >> 23) & 255U;
+    mantissa = (bits & 0x7FFFFFU) | 0x800000U;
+    if (exponent > 254U) { /* an infinity: as the largest number */
+        exponent = 254U;
+        mantissa = 0xFFFFFFU;
+    }
+    exponent = (exponent < 136U) ? 136U : exponent;
+    place = exponent - 88U;
+
+    for (int32_t k = 6; k > 0; k--) {
+        const uint32_t at = (place >> 5) + (uint32_t)k - 1U;
+        const uint64_t pair = ((uint64_t)two_over_pi[at] << 32) | two_over_pi[at + 1U];
+
+        words[k - 1] = (pair >> (32U - (place & 31U))) & mask;
+    }
+    for (int32_t k = 6; k > 0; k--) {
+        const uint64_t a = (mantissa & mask) * words[k - 1];
+        const uint64_t b = (mantissa >> 32) * right;
+        const uint64_t sum = (a & mask) + (b & mask) + (carry & mask);
+
+        carry = (a >> 32) + (b >> 32) + (carry >> 32) + (sum >> 32);
+        right = words[k - 1];
+        words[k - 1] = sum & mask;
+    }
+    high = (words[0] << 32) | words[1];
+    low = (words[2] << 32) | words[3];
+    quadrant = (uint32_t)(high >> 62);
+    high = high & 0x3FFFFFFFFFFFFFFFU;
+    is_above = high >= 0x2000000000000000U;
+    if (is_above) { /* the next multiple is nearer */
+        quadrant = quadrant + 1U;
+        low = 0U - low;
+        high = 0x4000000000000000U - high - ((low > 0U) ? 1U : 0U);
+    }
+    if (high == 0U) {
+        high = low;
+        low = 0U;
+        zeros = 64;
+    }
+    for (int32_t step = 32; step > 0; step = step / 2) { /* the leading bit to the highest place */
+        if ((high >> (64 - step)) == 0U) {
+            high = (high << step) | (low >> (64 - step));
+            low = low << step;
+            zeros = zeros + step;
+        }
+    }
+    angle = upper_product(high, 0xC90FDAA22168C235U); /* pi/2 * 2^63 */
+    *head = (float)(angle >> 40) * ha_pow2f((float)(-21 - zeros));
+    *tail = (float)((angle >> 16) & 0xFFFFFFU) * ha_pow2f((float)(-45 - zeros));
+    *head = is_above ? -(sign * *head) : (sign * *head);
+    *tail = is_above ? -(sign * *tail) : (sign * *tail);
+    quadrant = (x < 0.0F) ? (8U - quadrant) : quadrant;
+    return (float)(quadrant & 3U);
+}
+
+float ha_reduced_quadrantf(float x)
+{
+    float head;
+    float tail;
+
+    return reduce_far_angle(x, &head, &tail);
+}
+
+float ha_reduced_headf(float x)
+{
+    float head;
+    float tail;
+
+    (void)reduce_far_angle(x, &head, &tail);
+    return head;
+}
+
+float ha_reduced_tailf(float x)
+{
+    float head;
+    float tail;
+
+    (void)reduce_far_angle(x, &head, &tail);
+    return tail;
+}
+
+/* sine; every x; error < 0.85 ULP */
 float ha_sinf(float x)
 {
     float bounded;
@@ -37,15 +159,18 @@ float ha_sinf(float x)
     }
     const float quarters = (bounded * 0.63661975F) + 12582912.0F - 12582912.0F;
     const float turns = (0.25F * quarters) - 0.375F + 12582912.0F - 12582912.0F;
-    const float quadrant = quarters - (4.0F * turns);
+    const float side = quarters - (4.0F * turns);
     const float coarse = bounded - (quarters * 1.5708008F);
     const float fine = quarters * (-4.455447e-06F);
     const float finer = quarters * 9.922587e-10F;
     const float first = coarse - fine;
     const float lost = coarse - first - fine;
-    const float head = first - finer;
-    const float rest = first - head - finer;
-    const float tail = lost + rest - (quarters * (-1.6513996e-13F));
+    const float near = first - finer;
+    const float rest = first - near - finer;
+    const float quadrant = (fabsf(x) > 1000.0F) ? ha_reduced_quadrantf(x) : side;
+    const float head = (fabsf(x) > 1000.0F) ? ha_reduced_headf(x) : near;
+    const float tail = (fabsf(x) > 1000.0F) ? ha_reduced_tailf(x) : (lost + rest
+        - (quarters * (-1.6513996e-13F)));
     const float square = head * head;
     const float half = 0.5F * square;
     const float crest = 1.0F - half;
@@ -71,7 +196,7 @@ float ha_sinf(float x)
     return y;
 }
 
-/* cosine; |x| <= 1000 rad, clamped; error < 0.85 ULP */
+/* cosine; every x; error < 0.85 ULP */
 float ha_cosf(float x)
 {
     float bounded;
@@ -84,15 +209,18 @@ float ha_cosf(float x)
     }
     const float quarters = (bounded * 0.63661975F) + 12582912.0F - 12582912.0F;
     const float turns = (0.25F * quarters) - 0.375F + 12582912.0F - 12582912.0F;
-    const float quadrant = quarters - (4.0F * turns);
+    const float side = quarters - (4.0F * turns);
     const float coarse = bounded - (quarters * 1.5708008F);
     const float fine = quarters * (-4.455447e-06F);
     const float finer = quarters * 9.922587e-10F;
     const float first = coarse - fine;
     const float lost = coarse - first - fine;
-    const float head = first - finer;
-    const float rest = first - head - finer;
-    const float tail = lost + rest - (quarters * (-1.6513996e-13F));
+    const float near = first - finer;
+    const float rest = first - near - finer;
+    const float quadrant = (fabsf(x) > 1000.0F) ? ha_reduced_quadrantf(x) : side;
+    const float head = (fabsf(x) > 1000.0F) ? ha_reduced_headf(x) : near;
+    const float tail = (fabsf(x) > 1000.0F) ? ha_reduced_tailf(x) : (lost + rest
+        - (quarters * (-1.6513996e-13F)));
     const float square = head * head;
     const float half = 0.5F * square;
     const float crest = 1.0F - half;
@@ -161,7 +289,7 @@ float ha_tanhf(float x)
     return y;
 }
 
-/* tangent; |x| <= 1000 rad, clamped; error < 2.4 ULP */
+/* tangent; every x; error < 2.4 ULP */
 float ha_tanf(float x)
 {
     float bounded;
@@ -174,15 +302,18 @@ float ha_tanf(float x)
     }
     const float quarters = (bounded * 0.63661975F) + 12582912.0F - 12582912.0F;
     const float turns = (0.25F * quarters) - 0.375F + 12582912.0F - 12582912.0F;
-    const float quadrant = quarters - (4.0F * turns);
+    const float side = quarters - (4.0F * turns);
     const float coarse = bounded - (quarters * 1.5708008F);
     const float fine = quarters * (-4.455447e-06F);
     const float finer = quarters * 9.922587e-10F;
     const float first = coarse - fine;
     const float lost = coarse - first - fine;
-    const float head = first - finer;
-    const float rest = first - head - finer;
-    const float tail = lost + rest - (quarters * (-1.6513996e-13F));
+    const float near = first - finer;
+    const float rest = first - near - finer;
+    const float quadrant = (fabsf(x) > 1000.0F) ? ha_reduced_quadrantf(x) : side;
+    const float head = (fabsf(x) > 1000.0F) ? ha_reduced_headf(x) : near;
+    const float tail = (fabsf(x) > 1000.0F) ? ha_reduced_tailf(x) : (lost + rest
+        - (quarters * (-1.6513996e-13F)));
     const float square = head * head;
     const float half = 0.5F * square;
     const float crest = 1.0F - half;

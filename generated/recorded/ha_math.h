@@ -9,15 +9,20 @@
 #include <stdint.h>
 #include <string.h>
 
-double ha_sin(double x); /* sine; |x| <= 1e5 rad, clamped; error < 0.85 ULP */
-double ha_cos(double x); /* cosine; |x| <= 1e5 rad, clamped; error < 0.85 ULP */
+double ha_sin(double x); /* sine; every x; error < 0.85 ULP */
+double ha_cos(double x); /* cosine; every x; error < 0.85 ULP */
 double ha_exp(double x); /* e^x; -708 <= x <= 709, clamped; error < 0.95 ULP */
 double ha_tanh(double x); /* hyperbolic tangent; every x; error < 1.4 ULP */
-double ha_tan(double x); /* tangent; |x| <= 1e5 rad, clamped; error < 2.4 ULP */
+double ha_tan(double x); /* tangent; every x; error < 2.4 ULP */
 double ha_atan2(double rise, double run); /* angle of (run, rise), in (-pi, pi] rad; error < 1.5 ULP */
 double ha_log(double x); /* natural logarithm; 2^-1022 <= x, clamped; error < 0.9 ULP */
 double ha_pow(double base, double degree); /* base^degree; base >= 0, its power within that of exp, clamped; error < 0.95 ULP */
 double ha_pow2(double k); /* 2^k for a whole k from -1022 to 1023, else k */
+
+/* x = head + tail beyond a multiple of pi/2, quadrant 0 1 2 3: for |x| >= 2^16 */
+double ha_reduced_quadrant(double x);
+double ha_reduced_head(double x);
+double ha_reduced_tail(double x);
 
 /* Tables: linear between points, held outside, NaN at NaN */
 double ha_lookup(const double *axis, int32_t size, const double *values, double x);
