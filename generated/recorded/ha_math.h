@@ -67,18 +67,18 @@ static inline bool ha_within(double x, double low, double high)
     return (bits <= most) || ((bits >= sign) && ((bits & ~sign) <= (least & ~sign)));
 }
 
-/* A whole-valued x as a whole number, at most 2147483520 in size; a NaN is INT32_MIN */
+/* x towards 0 as a whole number; of larger sizes it is 2147483647 in size, of a NaN INT32_MIN */
 static inline int32_t ha_whole(double x)
 {
-    const double largest = (double)2147483520;
+    const double limit = (double)2147483648U;
     int32_t whole = INT32_MIN;
 
-    if ((x >= -largest) && (x <= largest)) {
+    if ((x > -limit) && (x < limit)) {
         whole = (int32_t)x;
     } else if (x > 0.0) {
-        whole = 2147483520;
+        whole = INT32_MAX;
     } else if (x < 0.0) {
-        whole = -2147483520;
+        whole = -INT32_MAX;
     } else {
         /* NaN */
     }

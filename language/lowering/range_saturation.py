@@ -33,6 +33,7 @@ from language.model.automaton import Automaton
 from language.model.declaration import Input, Range, State
 from language.numerics.evaluate import INTEGER_OF_NAN
 from language.text.diagnostic import Problems
+from language.typecheck.types import MAX_INT
 
 MAX_FAULT_BITS = 32
 """The number of fault bits of an instance, which are one uint32 word."""
@@ -147,7 +148,7 @@ def initialise_latched_inputs(automaton: Automaton) -> list[Op]:
     return ops
 
 
-def bound_literals(variable: Input | State) -> tuple[Expr, Expr]:
+def bound_literals(variable: Input | State) -> tuple[Value, Value]:
     """Return the lower and the upper bound of a range as literals of the variable's type.
 
     They are (0, 0) without a range.
@@ -164,7 +165,8 @@ def assign_saturated(
     A value that is no variable, or is the target itself, is stored in `work.new_<name>` first. A
     value outside the range sets the fault bit; the policy then clips it, takes the fallback or
     keeps the old value. It requests the fault mode, if there is one, for `on_range: fault` and for
-    a real input that is not finite.
+    a real input that is not finite. A range of an int that ends at +-MAX_INT does not contain this
+    end, because a real too large for the type is converted to it (rule C8).
     """
     ops: list[Op] = []
     if not isinstance(value, Ref) or value.name == target:
@@ -172,12 +174,20 @@ def assign_saturated(
         ops.append(Assign(new.name, value, key))
         value, key = new, ""
     low, high = bound_literals(variable)
-    inside = Binary("and", Compare(">=", value, low), Compare("<=", value, high))
+    above = Compare(">" if _is_saturated(variable, low) else ">=", value, low)
+    below = Compare("<" if _is_saturated(variable, high) else "<=", value, high)
+    inside = Binary("and", above, below)
     outside: list[Op] = [FaultBit(range_fault_of(variable), variable.name)]
     outside += _assign_out_of_range(variable, target, value)
     outside += _request_fault_mode(automaton, variable, value)
     ops.append(Branch(inside, (Assign(target, value, key),), tuple(outside)))
     return ops
+
+
+def _is_saturated(variable: Input | State, bound: Value) -> bool:
+    """Return whether a converted real has the value of a bound if it is too large for the type."""
+    is_converted = variable.type == "int" and not isinstance(variable, Input)
+    return is_converted and abs(int(bound.value)) == MAX_INT
 
 
 def saturable_variables(automaton: Automaton) -> list[Input | State]:

@@ -13,6 +13,7 @@ from language.ir.ops import Assign, Binary, Call, Compare, Expr, Item, Ref, Sele
 from language.numerics.function_table import FUNCTIONS_BY_TYPE
 from language.numerics.interpolation import Interpolation
 from language.numerics.payne_hanek import reduction_operations
+from language.typecheck.types import MAX_INT
 
 ARITHMETIC: Mapping[str, Callable[[Any, Any], Any]] = {
     "+": operator.add,
@@ -85,21 +86,19 @@ def power_of_two(k: float) -> float:
     return math.ldexp(1.0, int(k)) if -1022.0 <= k <= 1023.0 else k
 
 
-MAX_FLOAT32_INTEGER = 2147483520
-"""Largest result of a conversion to a whole number: 2^31 - 128, which is exact in float32."""
-
 INTEGER_OF_NAN = -(2**31)
 """Result of the conversion of a NaN: outside every range, so that a saturation detects it."""
 
 
 def to_integer(x: float) -> int:
-    """Return a real, truncated towards 0, as a whole number within +-MAX_FLOAT32_INTEGER (rule C8).
+    """Return a real, truncated towards 0, as a whole number of 32 bits (rule C8).
 
-    Larger numbers and infinities give that limit. A NaN gives INTEGER_OF_NAN.
+    It is within +-MAX_INT: larger numbers and infinities give that limit. A NaN gives
+    INTEGER_OF_NAN.
     """
-    if -MAX_FLOAT32_INTEGER <= x <= MAX_FLOAT32_INTEGER:
+    if abs(x) < MAX_INT + 1:
         return int(x)
-    return MAX_FLOAT32_INTEGER if x > 0.0 else (-MAX_FLOAT32_INTEGER if x < 0.0 else INTEGER_OF_NAN)
+    return MAX_INT if x > 0.0 else (-MAX_INT if x < 0.0 else INTEGER_OF_NAN)
 
 
 def power_of_two_float32(k: float) -> float:
