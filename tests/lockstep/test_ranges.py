@@ -242,7 +242,7 @@ def test_a_real_too_large_for_an_int_saturates_with_a_fault_bit(
     assert row["discrete.few"] == max(-9, min(value, 9))
     assert row["discrete.kept"] == (1 if value > 9 or is_too_large else value)
     faults = enumerate(tape.program.faults)
-    found = {name for bit, name in faults if row["memory.faults"] >> bit & 1}
+    found = {name for bit, name in faults if int(row["memory.faults"]) >> bit & 1}
     assert found == {
         *({"range_any"} if is_too_large else ()),
         *({"range_up"} if value < 0 or is_too_large else ()),
@@ -260,3 +260,12 @@ def test_conversions_have_the_same_bits_in_c(number: NumberType, tmp_path: Path)
     tape = convert(number, tmp_path, [sign * x for x in reals for sign in (1.0, -1.0)])
     verdict = compare(tape)
     assert verdict.is_equal, str(verdict.first)
+
+
+def test_the_limit_of_the_type_is_no_fault_where_no_real_is_converted(tmp_path: Path) -> None:
+    text = CONVERSIONS.format(numbers="float64").replace("any: floor(u)", "any: \"max(any, up)\"")
+    text = text.replace("any: {type: int, initial: 0", "any: {type: int, initial: -2147483647")
+    (tmp_path / "conversions.yaml").write_text(text)
+    made = program(str(tmp_path / "conversions.yaml"))
+    tape = record_ticks(made, [{"input.u": 3.0}, {"input.u": 4.0}])
+    assert tape.unpack(tape.values[0])[tape.names.index("memory.faults")] == 0

@@ -46,7 +46,12 @@ def parts(expr: Expr) -> Iterator[Expr]:
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_form(name: str) -> None:
     """Each local is assigned once and before its use, y last; only what rule C5 allows."""
-    callable_names = {"abs", "pow2", *REDUCED_PARTS, *list(FUNCTIONS)[: list(FUNCTIONS).index(name)]}
+    callable_names = {
+        "abs",
+        "pow2",
+        *REDUCED_PARTS,
+        *list(FUNCTIONS)[: list(FUNCTIONS).index(name)],
+    }
     parameters = [f"work.{parameter}" for parameter in FUNCTIONS[name].parameters]
     known = list(parameters)
     for op in FUNCTIONS[name].body:

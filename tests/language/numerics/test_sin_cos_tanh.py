@@ -39,7 +39,7 @@ def anywhere(name: str, draw: random.Random) -> float:
     choice = draw.randrange(4)
     if name in ("sin", "cos", "tan"):
         if draw.random() < 0.1:
-            return draw.choice((-1.0, 1.0)) * 2.0 ** draw.uniform(16.0, 1023.9)
+            return draw.choice((-1.0, 1.0)) * math.exp2(draw.uniform(16.0, 1023.9))
         low, high = -MAX_ANGLE, MAX_ANGLE
     if name == "log":
         power = draw.uniform(-1022.0, 1023.9) if choice else draw.uniform(-0.6, 0.6)

@@ -155,8 +155,7 @@ def test_the_first_other_point_of_a_table_is_named(root: Path) -> None:
     ],
 )
 def test_units_of_tools_in_the_notation_of_the_language(text: str, unit: str) -> None:
-    assert rewrite_unit(text) == unit
-    assert parse_unit(unit)
+    assert rewrite_unit(text) == parse_unit(unit).text == unit
 
 
 @pytest.mark.parametrize("symbol", sorted(SYMBOLS))
