@@ -263,7 +263,7 @@ def test_conversions_have_the_same_bits_in_c(number: NumberType, tmp_path: Path)
 
 
 def test_the_limit_of_the_type_is_no_fault_where_no_real_is_converted(tmp_path: Path) -> None:
-    text = CONVERSIONS.format(numbers="float64").replace("any: floor(u)", "any: \"max(any, up)\"")
+    text = CONVERSIONS.format(numbers="float64").replace("any: floor(u)", 'any: "max(any, up)"')
     text = text.replace("any: {type: int, initial: 0", "any: {type: int, initial: -2147483647")
     (tmp_path / "conversions.yaml").write_text(text)
     made = program(str(tmp_path / "conversions.yaml"))
