@@ -85,6 +85,7 @@ def _reduction_context(form: AngleFormat) -> dict[str, Any]:
         "half_pi": f"0x{HALF_PI:X}U",
         "head_place": 64 - size,
         "tail_place": max(0, 64 - 2 * size),
+        "rests": {step: f"0x{2 ** (64 - step) - 1:X}U" for step in (32, 16, 8, 4, 2, 1)},
         "tail_mask": f"0x{2 ** (64 - size - max(0, 64 - 2 * size)) - 1:X}U",
     }
 

@@ -38,10 +38,10 @@ static uint64_t upper_product(uint64_t a, uint64_t b)
 {
     const uint64_t mask = 0xFFFFFFFFU;
     const uint64_t low = (a & mask) * (b & mask);
-    const uint64_t inner = ((a >> 32) * (b & mask)) + (low >> 32);
-    const uint64_t outer = ((a & mask) * (b >> 32)) + (inner & mask);
+    const uint64_t inner = ((a >> 32U) * (b & mask)) + (low >> 32U);
+    const uint64_t outer = ((a & mask) * (b >> 32U)) + (inner & mask);
 
-    return ((a >> 32) * (b >> 32)) + (inner >> 32) + (outer >> 32);
+    return ((a >> 32U) * (b >> 32U)) + (inner >> 32U) + (outer >> 32U);
 }
 
 /*
@@ -54,6 +54,7 @@ static double reduce_far_angle(double x, double *head, double *tail)
     const uint64_t mask = 0xFFFFFFFFU;
     const double sign = (x < 0.0) ? -1.0 : 1.0;
     uint64_t bits;
+    uint64_t wide;
     uint64_t mantissa;
     uint32_t exponent;
     uint32_t place;
@@ -66,10 +67,15 @@ static double reduce_far_angle(double x, double *head, double *tail)
     int32_t zeros = 0;
     bool is_above;
     uint64_t angle;
+    uint64_t part;
+    int32_t power;
+    double size;
 
     (void)memcpy(&bits, &x, sizeof bits);
-    exponent = (uint32_t)(bits >> 52) & 2047U;
-    mantissa = (bits & 0xFFFFFFFFFFFFFU) | 0x10000000000000U;
+    wide = bits;
+    part = (wide >> 52U) & 2047U;
+    exponent = (uint32_t)part;
+    mantissa = (wide & 0xFFFFFFFFFFFFFU) | 0x10000000000000U;
     if (exponent > 2046U) { /* an infinity: as the largest number */
         exponent = 2046U;
         mantissa = 0x1FFFFFFFFFFFFFU;
@@ -78,49 +84,77 @@ static double reduce_far_angle(double x, double *head, double *tail)
     place = exponent - 1013U;
 
     for (int32_t k = 6; k > 0; k--) {
-        const uint32_t at = (place >> 5) + (uint32_t)k - 1U;
-        const uint64_t pair = ((uint64_t)two_over_pi[at] << 32) | two_over_pi[at + 1U];
+        const uint32_t at = (place >> 5U) + (uint32_t)k - 1U;
+        const uint32_t shift = 32U - (place & 31U);
+        const uint64_t left = two_over_pi[at];
+        const uint64_t next = two_over_pi[at + 1U];
 
-        words[k - 1] = (pair >> (32U - (place & 31U))) & mask;
+        words[k - 1] = (((left << 32U) | next) >> shift) & mask;
     }
     for (int32_t k = 6; k > 0; k--) {
         const uint64_t a = (mantissa & mask) * words[k - 1];
-        const uint64_t b = (mantissa >> 32) * right;
+        const uint64_t b = (mantissa >> 32U) * right;
         const uint64_t sum = (a & mask) + (b & mask) + (carry & mask);
 
-        carry = (a >> 32) + (b >> 32) + (carry >> 32) + (sum >> 32);
+        carry = (a >> 32U) + (b >> 32U) + (carry >> 32U) + (sum >> 32U);
         right = words[k - 1];
         words[k - 1] = sum & mask;
     }
-    high = (words[0] << 32) | words[1];
-    low = (words[2] << 32) | words[3];
-    quadrant = (uint32_t)(high >> 62);
+    high = (words[0] << 32U) | words[1];
+    low = (words[2] << 32U) | words[3];
+    part = high >> 62U;
+    quadrant = (uint32_t)part;
     high = high & 0x3FFFFFFFFFFFFFFFU;
     is_above = high >= 0x2000000000000000U;
     if (is_above) { /* the next multiple is nearer */
         quadrant = quadrant + 1U;
-        low = 0U - low;
-        high = 0x4000000000000000U - high - ((low > 0U) ? 1U : 0U);
+        low = (low > 0U) ? ((UINT64_MAX - low) + 1U) : 0U;
+        high = ((low > 0U) ? 0x3FFFFFFFFFFFFFFFU : 0x4000000000000000U) - high;
     }
-    if (high == 0U) {
-        high = low;
-        low = 0U;
-        zeros = 64;
+    /* The leading bit is moved to the highest place; no number needs more than 63 places */
+    if ((high >> 32U) == 0U) {
+        high = ((high & 0xFFFFFFFFU) << 32U) | (low >> 32U);
+        low = (low & 0xFFFFFFFFU) << 32U;
+        zeros = zeros + 32;
     }
-    for (int32_t step = 32; step > 0; step = step / 2) { /* the leading bit to the highest place */
-        if ((high >> (64 - step)) == 0U) {
-            high = (high << step) | (low >> (64 - step));
-            low = low << step;
-            zeros = zeros + step;
-        }
+    if ((high >> 48U) == 0U) {
+        high = ((high & 0xFFFFFFFFFFFFU) << 16U) | (low >> 48U);
+        low = (low & 0xFFFFFFFFFFFFU) << 16U;
+        zeros = zeros + 16;
+    }
+    if ((high >> 56U) == 0U) {
+        high = ((high & 0xFFFFFFFFFFFFFFU) << 8U) | (low >> 56U);
+        low = (low & 0xFFFFFFFFFFFFFFU) << 8U;
+        zeros = zeros + 8;
+    }
+    if ((high >> 60U) == 0U) {
+        high = ((high & 0xFFFFFFFFFFFFFFFU) << 4U) | (low >> 60U);
+        low = (low & 0xFFFFFFFFFFFFFFFU) << 4U;
+        zeros = zeros + 4;
+    }
+    if ((high >> 62U) == 0U) {
+        high = ((high & 0x3FFFFFFFFFFFFFFFU) << 2U) | (low >> 62U);
+        low = (low & 0x3FFFFFFFFFFFFFFFU) << 2U;
+        zeros = zeros + 2;
+    }
+    if ((high >> 63U) == 0U) {
+        high = ((high & 0x7FFFFFFFFFFFFFFFU) << 1U) | (low >> 63U);
+        low = (low & 0x7FFFFFFFFFFFFFFFU) << 1U;
+        zeros = zeros + 1;
     }
     angle = upper_product(high, 0xC90FDAA22168C235U); /* pi/2 * 2^63 */
-    *head = (double)(angle >> 11) * ha_pow2((double)(-50 - zeros));
-    *tail = (double)((angle >> 0) & 0x7FFU) * ha_pow2((double)(-61 - zeros));
-    *head = is_above ? -(sign * *head) : (sign * *head);
-    *tail = is_above ? -(sign * *tail) : (sign * *tail);
-    quadrant = (x < 0.0) ? (8U - quadrant) : quadrant;
-    return (double)(quadrant & 3U);
+    size = is_above ? -sign : sign;
+    part = angle >> 11U;
+    power = -50 - zeros;
+    *head = size * ((double)part * ha_pow2((double)power));
+    part = (angle >> 0U) & 0x7FFU;
+    power = -61 - zeros;
+    *tail = size * ((double)part * ha_pow2((double)power));
+    if (x < 0.0) {
+        quadrant = 8U - quadrant;
+    }
+    quadrant = quadrant & 3U;
+    return (double)quadrant;
 }
 
 double ha_reduced_quadrant(double x)

@@ -35,10 +35,10 @@ static uint64_t upper_product(uint64_t a, uint64_t b)
 {
     const uint64_t mask = 0xFFFFFFFFU;
     const uint64_t low = (a & mask) * (b & mask);
-    const uint64_t inner = ((a >> 32) * (b & mask)) + (low >> 32);
-    const uint64_t outer = ((a & mask) * (b >> 32)) + (inner & mask);
+    const uint64_t inner = ((a >> 32U) * (b & mask)) + (low >> 32U);
+    const uint64_t outer = ((a & mask) * (b >> 32U)) + (inner & mask);
 
-    return ((a >> 32) * (b >> 32)) + (inner >> 32) + (outer >> 32);
+    return ((a >> 32U) * (b >> 32U)) + (inner >> 32U) + (outer >> 32U);
 }
 
 /*
@@ -51,6 +51,7 @@ static float reduce_far_angle(float x, float *head, float *tail)
     const uint64_t mask = 0xFFFFFFFFU;
     const float sign = (x < 0.0F) ? -1.0F : 1.0F;
     uint32_t bits;
+    uint64_t wide;
     uint64_t mantissa;
     uint32_t exponent;
     uint32_t place;
@@ -63,10 +64,15 @@ static float reduce_far_angle(float x, float *head, float *tail)
     int32_t zeros = 0;
     bool is_above;
     uint64_t angle;
+    uint64_t part;
+    int32_t power;
+    float size;
 
     (void)memcpy(&bits, &x, sizeof bits);
-    exponent = (uint32_t)(bits >> 23) & 255U;
-    mantissa = (bits & 0x7FFFFFU) | 0x800000U;
+    wide = bits;
+    part = (wide >> 23U) & 255U;
+    exponent = (uint32_t)part;
+    mantissa = (wide & 0x7FFFFFU) | 0x800000U;
     if (exponent > 254U) { /* an infinity: as the largest number */
         exponent = 254U;
         mantissa = 0xFFFFFFU;
@@ -75,49 +81,77 @@ static float reduce_far_angle(float x, float *head, float *tail)
     place = exponent - 88U;
 
     for (int32_t k = 6; k > 0; k--) {
-        const uint32_t at = (place >> 5) + (uint32_t)k - 1U;
-        const uint64_t pair = ((uint64_t)two_over_pi[at] << 32) | two_over_pi[at + 1U];
+        const uint32_t at = (place >> 5U) + (uint32_t)k - 1U;
+        const uint32_t shift = 32U - (place & 31U);
+        const uint64_t left = two_over_pi[at];
+        const uint64_t next = two_over_pi[at + 1U];
 
-        words[k - 1] = (pair >> (32U - (place & 31U))) & mask;
+        words[k - 1] = (((left << 32U) | next) >> shift) & mask;
     }
     for (int32_t k = 6; k > 0; k--) {
         const uint64_t a = (mantissa & mask) * words[k - 1];
-        const uint64_t b = (mantissa >> 32) * right;
+        const uint64_t b = (mantissa >> 32U) * right;
         const uint64_t sum = (a & mask) + (b & mask) + (carry & mask);
 
-        carry = (a >> 32) + (b >> 32) + (carry >> 32) + (sum >> 32);
+        carry = (a >> 32U) + (b >> 32U) + (carry >> 32U) + (sum >> 32U);
         right = words[k - 1];
         words[k - 1] = sum & mask;
     }
-    high = (words[0] << 32) | words[1];
-    low = (words[2] << 32) | words[3];
-    quadrant = (uint32_t)(high >> 62);
+    high = (words[0] << 32U) | words[1];
+    low = (words[2] << 32U) | words[3];
+    part = high >> 62U;
+    quadrant = (uint32_t)part;
     high = high & 0x3FFFFFFFFFFFFFFFU;
     is_above = high >= 0x2000000000000000U;
     if (is_above) { /* the next multiple is nearer */
         quadrant = quadrant + 1U;
-        low = 0U - low;
-        high = 0x4000000000000000U - high - ((low > 0U) ? 1U : 0U);
+        low = (low > 0U) ? ((UINT64_MAX - low) + 1U) : 0U;
+        high = ((low > 0U) ? 0x3FFFFFFFFFFFFFFFU : 0x4000000000000000U) - high;
     }
-    if (high == 0U) {
-        high = low;
-        low = 0U;
-        zeros = 64;
+    /* The leading bit is moved to the highest place; no number needs more than 63 places */
+    if ((high >> 32U) == 0U) {
+        high = ((high & 0xFFFFFFFFU) << 32U) | (low >> 32U);
+        low = (low & 0xFFFFFFFFU) << 32U;
+        zeros = zeros + 32;
     }
-    for (int32_t step = 32; step > 0; step = step / 2) { /* the leading bit to the highest place */
-        if ((high >> (64 - step)) == 0U) {
-            high = (high << step) | (low >> (64 - step));
-            low = low << step;
-            zeros = zeros + step;
-        }
+    if ((high >> 48U) == 0U) {
+        high = ((high & 0xFFFFFFFFFFFFU) << 16U) | (low >> 48U);
+        low = (low & 0xFFFFFFFFFFFFU) << 16U;
+        zeros = zeros + 16;
+    }
+    if ((high >> 56U) == 0U) {
+        high = ((high & 0xFFFFFFFFFFFFFFU) << 8U) | (low >> 56U);
+        low = (low & 0xFFFFFFFFFFFFFFU) << 8U;
+        zeros = zeros + 8;
+    }
+    if ((high >> 60U) == 0U) {
+        high = ((high & 0xFFFFFFFFFFFFFFFU) << 4U) | (low >> 60U);
+        low = (low & 0xFFFFFFFFFFFFFFFU) << 4U;
+        zeros = zeros + 4;
+    }
+    if ((high >> 62U) == 0U) {
+        high = ((high & 0x3FFFFFFFFFFFFFFFU) << 2U) | (low >> 62U);
+        low = (low & 0x3FFFFFFFFFFFFFFFU) << 2U;
+        zeros = zeros + 2;
+    }
+    if ((high >> 63U) == 0U) {
+        high = ((high & 0x7FFFFFFFFFFFFFFFU) << 1U) | (low >> 63U);
+        low = (low & 0x7FFFFFFFFFFFFFFFU) << 1U;
+        zeros = zeros + 1;
     }
     angle = upper_product(high, 0xC90FDAA22168C235U); /* pi/2 * 2^63 */
-    *head = (float)(angle >> 40) * ha_pow2f((float)(-21 - zeros));
-    *tail = (float)((angle >> 16) & 0xFFFFFFU) * ha_pow2f((float)(-45 - zeros));
-    *head = is_above ? -(sign * *head) : (sign * *head);
-    *tail = is_above ? -(sign * *tail) : (sign * *tail);
-    quadrant = (x < 0.0F) ? (8U - quadrant) : quadrant;
-    return (float)(quadrant & 3U);
+    size = is_above ? -sign : sign;
+    part = angle >> 40U;
+    power = -21 - zeros;
+    *head = size * ((float)part * ha_pow2f((float)power));
+    part = (angle >> 16U) & 0xFFFFFFU;
+    power = -45 - zeros;
+    *tail = size * ((float)part * ha_pow2f((float)power));
+    if (x < 0.0F) {
+        quadrant = 8U - quadrant;
+    }
+    quadrant = quadrant & 3U;
+    return (float)quadrant;
 }
 
 float ha_reduced_quadrantf(float x)

@@ -89,7 +89,7 @@ def reduce_far_angle(x: float, number_type: NumberType) -> tuple[float, float, f
     is_above = fraction >= 2**125
     if is_above:
         quadrant, fraction = quadrant + 1, 2**126 - fraction
-    zeros = 128 - fraction.bit_length()
+    zeros = 128 - fraction.bit_length()  # at most 63, see WINDOW_BITS
     angle = ((fraction << zeros >> 64) * HALF_PI) >> 64
     head_place, tail_place = 64 - size, max(0, 64 - 2 * size)
     rest = (angle >> tail_place) % 2 ** (head_place - tail_place)
