@@ -1397,7 +1397,7 @@ void driveline_Derive(const volatile driveline_Cal *cal, driveline_Derived *deri
 
 void driveline_Init(driveline_Self *self, const volatile driveline_Cal *cal)
 {
-    static const driveline_Self zero; /* every member 0 or false */
+    static const driveline_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     driveline_Derive(cal, &self->derived);

@@ -1457,7 +1457,7 @@ void driveline_load_Derive(const volatile driveline_load_Cal *cal, driveline_loa
 
 void driveline_load_Init(driveline_load_Self *self, const volatile driveline_load_Cal *cal)
 {
-    static const driveline_load_Self zero; /* every member 0 or false */
+    static const driveline_load_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     driveline_load_Derive(cal, &self->derived);

@@ -1511,7 +1511,7 @@ void estimator_Derive(const volatile estimator_Cal *cal, estimator_Derived *deri
 
 void estimator_Init(estimator_Self *self, const volatile estimator_Cal *cal)
 {
-    static const estimator_Self zero; /* every member 0 or false */
+    static const estimator_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     estimator_Derive(cal, &self->derived);

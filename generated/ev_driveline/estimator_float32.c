@@ -1951,7 +1951,7 @@ void estimator_float32_Derive(const volatile estimator_float32_Cal *cal, estimat
 
 void estimator_float32_Init(estimator_float32_Self *self, const volatile estimator_float32_Cal *cal)
 {
-    static const estimator_float32_Self zero; /* every member 0 or false */
+    static const estimator_float32_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     estimator_float32_Derive(cal, &self->derived);

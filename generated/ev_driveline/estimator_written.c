@@ -1525,7 +1525,7 @@ void estimator_written_Derive(const volatile estimator_written_Cal *cal, estimat
 
 void estimator_written_Init(estimator_written_Self *self, const volatile estimator_written_Cal *cal)
 {
-    static const estimator_written_Self zero; /* every member 0 or false */
+    static const estimator_written_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     estimator_written_Derive(cal, &self->derived);

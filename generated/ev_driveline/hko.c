@@ -2915,7 +2915,7 @@ void hko_Derive(const volatile hko_Cal *cal, hko_Derived *derived)
 
 void hko_Init(hko_Self *self, const volatile hko_Cal *cal)
 {
-    static const hko_Self zero; /* every member 0 or false */
+    static const hko_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     hko_Derive(cal, &self->derived);

@@ -1507,7 +1507,7 @@ void leaf_Derive(const volatile leaf_Cal *cal, leaf_Derived *derived)
 
 void leaf_Init(leaf_Self *self, const volatile leaf_Cal *cal)
 {
-    static const leaf_Self zero; /* every member 0 or false */
+    static const leaf_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     leaf_Derive(cal, &self->derived);

@@ -2920,7 +2920,7 @@ void leaf_hko_Derive(const volatile leaf_hko_Cal *cal, leaf_hko_Derived *derived
 
 void leaf_hko_Init(leaf_hko_Self *self, const volatile leaf_hko_Cal *cal)
 {
-    static const leaf_hko_Self zero; /* every member 0 or false */
+    static const leaf_hko_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     leaf_hko_Derive(cal, &self->derived);

@@ -1652,7 +1652,7 @@ void driveline_rubber_Derive(const volatile driveline_rubber_Cal *cal, driveline
 
 void driveline_rubber_Init(driveline_rubber_Self *self, const volatile driveline_rubber_Cal *cal)
 {
-    static const driveline_rubber_Self zero; /* every member 0 or false */
+    static const driveline_rubber_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     driveline_rubber_Derive(cal, &self->derived);

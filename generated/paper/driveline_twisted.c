@@ -1438,7 +1438,7 @@ void driveline_twisted_Derive(const volatile driveline_twisted_Cal *cal, driveli
 
 void driveline_twisted_Init(driveline_twisted_Self *self, const volatile driveline_twisted_Cal *cal)
 {
-    static const driveline_twisted_Self zero; /* every member 0 or false */
+    static const driveline_twisted_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     driveline_twisted_Derive(cal, &self->derived);

@@ -1528,7 +1528,7 @@ void estimator_10kHz_Derive(const volatile estimator_10kHz_Cal *cal, estimator_1
 
 void estimator_10kHz_Init(estimator_10kHz_Self *self, const volatile estimator_10kHz_Cal *cal)
 {
-    static const estimator_10kHz_Self zero; /* every member 0 or false */
+    static const estimator_10kHz_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     estimator_10kHz_Derive(cal, &self->derived);

@@ -149,7 +149,7 @@ void heater_Derive(const volatile heater_Cal *cal, heater_Derived *derived)
 
 void heater_Init(heater_Self *self, const volatile heater_Cal *cal)
 {
-    static const heater_Self zero; /* every member 0 or false */
+    static const heater_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     heater_Derive(cal, &self->derived);
