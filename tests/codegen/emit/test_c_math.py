@@ -158,7 +158,9 @@ period: 10 ms
 numbers: {numbers}
 parameters:
   one: {{table: {{over: u, unit: N*m, points: {{0: 5, 1: 6, 4: 7}}}}, tunable: true}}
-  two: {{table: {{over: [u, v], unit: 1, points: {{0: {{0: 1, 1: 2}}, 1: {{0: 3, 1: 4}}}}}}, tunable: true}}
+  two:
+    table: {{over: [u, v], unit: 1, points: {{0: {{0: 1, 1: 2}}, 1: {{0: 3, 1: 4}}}}}}
+    tunable: true
   fixed: {{table: {{over: u, unit: 1, points: {{0: 5, 1: 6}}}}}}
   gain: {{value: 2, range: [0, 5], tunable: true}}
 inputs: {{u: {{unit: 1, range: [0, 9]}}, v: {{unit: 1, range: [0, 9]}}}}
