@@ -20,6 +20,14 @@ from language.ir.number_type import NumberType
 from language.ir.ops import Assign, Select
 from language.ir.program import Function, unqualified_name
 from language.numerics.function_table import FUNCTIONS_BY_TYPE
+from language.numerics.payne_hanek import (
+    ANGLE_FORMATS,
+    HALF_PI,
+    WINDOW_BITS,
+    WORD_BITS,
+    ZERO_BITS,
+    AngleFormat,
+)
 
 
 @dataclass(frozen=True)
@@ -51,12 +59,34 @@ def emit_math_files(number: NumberType) -> dict[str, str]:
             _function_context(function, number) for function in FUNCTIONS_BY_TYPE[number].values()
         ],
         "layout": FLOAT_FORMATS[number],
+        "reduction": _reduction_context(ANGLE_FORMATS[number]),
         "lowest": format_literal(float(FLOAT_FORMATS[number].lowest), number),
         "highest": format_literal(float(FLOAT_FORMATS[number].highest), number),
     }
     return {
         f"ha_math{suffix}.h": render("emit/ha_math.h.jinja", context),
         f"ha_math{suffix}.c": render("emit/ha_math.c.jinja", context),
+    }
+
+
+def _reduction_context(form: AngleFormat) -> dict[str, Any]:
+    """Return what the template of the Payne-Hanek reduction needs: the table, places and masks."""
+    size = form.digits + 1
+    return {
+        "words": form.words,
+        "zero_words": ZERO_BITS // WORD_BITS,
+        "window_words": WINDOW_BITS // WORD_BITS,
+        "lowest": form.lowest,
+        "highest": form.highest,
+        "first_place": form.first_place,
+        "fraction_mask": f"0x{2**form.digits - 1:X}U",
+        "leading_bit": f"0x{2**form.digits:X}U",
+        "full_mantissa": f"0x{2**size - 1:X}U",
+        "half_pi": f"0x{HALF_PI:X}U",
+        "head_place": 64 - size,
+        "tail_place": max(0, 64 - 2 * size),
+        "rests": {step: f"0x{2 ** (64 - step) - 1:X}U" for step in (32, 16, 8, 4, 2, 1)},
+        "tail_mask": f"0x{2 ** (64 - size - max(0, 64 - 2 * size)) - 1:X}U",
     }
 
 

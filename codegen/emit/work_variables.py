@@ -65,9 +65,10 @@ def scratch_of(
         return None
     known = frozenset(variable.name for variable in shared)
     block = _innermost_block(program, known, usage_by_block) if allow_inner_block else STEP
-    names = find_unassigned_reads(program, block, known)
     each = 8 if program.number_type == "float64" else 4
     size = sum(each * max(1, variable.size) for variable in shared)
+    # Compilers warn of variables on the stack, and they do not know which modes there are.
+    names = find_unassigned_reads(program, block, known, are_modes_known=size > MAX_STACK_BYTES)
     return Scratch(block, size, tuple(v for v in shared if v.name in names))
 
 

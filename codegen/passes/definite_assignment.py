@@ -30,13 +30,16 @@ WORK = "work."
 NameSet = frozenset[str]
 
 
-def find_unassigned_reads(program: Program, entry: str, shared: frozenset[str]) -> frozenset[str]:
+def find_unassigned_reads(
+    program: Program, entry: str, shared: frozenset[str], are_modes_known: bool = True
+) -> frozenset[str]:
     """Return the shared work variables that the block `entry` may read before it assigns them.
 
     Blocks that it runs are followed. For an array it is enough that one element that may be read is
-    unassigned.
+    unassigned. Without `are_modes_known` the mode may have any number, as a compiler assumes: then
+    a switch may take none of its cases, even if they are all modes.
     """
-    analysis = _AssignmentAnalysis(program, shared)
+    analysis = _AssignmentAnalysis(program, shared, are_modes_known)
     analysis.analyse_block(program.blocks[entry], frozenset())
     return frozenset(analysis.unassigned_reads)
 
@@ -48,11 +51,11 @@ class _AssignmentAnalysis:
     assigned names and loop indices with which it runs.
     """
 
-    def __init__(self, program: Program, shared: frozenset[str]) -> None:
+    def __init__(self, program: Program, shared: frozenset[str], are_modes_known: bool) -> None:
         self.program = program
         self.shared = shared
         self.sizes = {v.name: v.size for v in program.variables if v.size}
-        self.modes = {mode.number for mode in program.modes}
+        self.modes = {mode.number for mode in program.modes} if are_modes_known else set()
         self.summaries: dict[tuple[str, NameSet, frozenset[tuple[str, int]]], NameSet] = {}
         self.loop_indices: dict[str, int] = {}
         self.unassigned_reads: set[str] = set()

@@ -38,6 +38,7 @@ from language.ir.program import MODE_VARIABLE, Program, unqualified_name
 from language.ir.rewrite_ops import map_expressions, map_operands
 from language.ir.traversal import block_writes, subexpressions
 from language.numerics.function_table import FUNCTIONS
+from language.numerics.payne_hanek import REDUCED_PARTS
 
 PAGE_PREFIXES = ("derived.", "calibration.")
 """Prefixes of names that are constant during a run."""
@@ -367,9 +368,10 @@ def _emit_functions(
 def _emit_value(emitter: VectorEmitter, name: str, kind: LaneKind, value: Expr) -> list[str]:
     """Return the lines that define a value.
 
-    If both arms of a choice divide, each arm is computed only if a lane selects it.
+    If both arms of a choice divide, or one arm is the reduction of a large angle, each arm is
+    computed only if a lane selects it.
     """
-    if not (isinstance(value, Select) and _has_division(value.then) and _has_division(value.other)):
+    if not (isinstance(value, Select) and _are_arms_costly(value)):
         return _emit_constant(name, kind, emitter.emit_expression(value))
     then, other, chosen = f"{name}_then", f"{name}_other", f"is_{name}_then"
     sides = (then, value.then, chosen), (other, value.other, f"~{chosen}")
@@ -388,6 +390,14 @@ def _emit_value(emitter: VectorEmitter, name: str, kind: LaneKind, value: Expr) 
         *lines,
         *_emit_constant(name, kind, f"{_select_macro(kind)}({chosen}, {then}, {other})"),
     ]
+
+
+def _are_arms_costly(choice: Select) -> bool:
+    """Tell whether both arms of a choice contain a division, or one arm reduces a large angle."""
+    arms = choice.then, choice.other
+    return all(map(_has_division, arms)) or any(
+        isinstance(arm, Call) and arm.function in REDUCED_PARTS for arm in arms
+    )
 
 
 def _has_division(expr: Expr) -> bool:

@@ -2,6 +2,9 @@
 
 A key is the digest of the sources, the compiler and its flags. The folder belongs to the user and
 is closed to others (mode 0700). Any other folder is not used, and programs are compiled each time.
+Every file of the cache is sealed: a digest of its content is stored, and a file whose content has
+another digest is made anew. The digest of a program is in a file beside it, because the linker and
+the loader read the program; all other files begin with their digest (`write_sealed`).
 """
 
 from __future__ import annotations
@@ -30,6 +33,8 @@ CACHE_VARIABLE = "MODEWRIGHT_CACHE"
 """The environment variable with the folder of the cache."""
 KEY_LENGTH = 64
 """Number of characters of a key."""
+SEAL_LENGTH = 32
+"""Number of bytes of the digest at the beginning of a sealed file."""
 MAX_PROGRAMS = 200
 """Number of programs that are always kept (100 kB each). Of more, those not used for a day are
 removed, the oldest first."""
@@ -197,6 +202,28 @@ def _store(built: Path, target: Path) -> None:
 def _digest_file(target: Path) -> Path:
     """Return the path of the file with the digest of a program."""
     return target.with_name(target.name + ".sha256")
+
+
+def write_sealed(path: Path, data: bytes) -> None:
+    """Write data to a file of the cache that is no program, behind their SHA-256 (32 bytes).
+
+    The file is replaced atomically. Raises OSError.
+    """
+    write_atomically(path, hashlib.sha256(data).digest() + data)
+
+
+def read_sealed(path: Path) -> bytes | None:
+    """Return the data of a file that `write_sealed` wrote; None if it is missing or damaged.
+
+    A file is damaged if its data have another digest than the stored one. Links, folders and pipes
+    are not read. Raises nothing.
+    """
+    try:
+        content = path.read_bytes() if stat.S_ISREG(path.lstat().st_mode) else b""
+    except OSError:
+        return None
+    seal, data = content[:SEAL_LENGTH], content[SEAL_LENGTH:]
+    return data if hashlib.sha256(data).digest() == seal else None
 
 
 def remove_old_programs(folder: Path) -> None:

@@ -43,6 +43,8 @@ from language.ir.traversal import (
 )
 from language.numerics.evaluate import BINARY_OPERATIONS
 
+FunctionMap = Mapping[str, Callable[..., Any]]
+"""Elementary functions by name."""
 MAX_FUSED_ASSIGNMENTS = 4
 """Largest number of assignments in one closure (engine/interpreter/statement_closures.py)."""
 MAX_UNROLLED_TURNS = 8
@@ -63,7 +65,8 @@ class BlockCompiler:
     variables and constants.
     """
 
-    def __init__(self, program: Program) -> None:
+    def __init__(self, program: Program, functions: FunctionMap | None = None) -> None:
+        """Compile a Program; `functions` replace functions of the Program by name."""
         self.program = program
         self.faults = {name: 1 << bit for bit, name in enumerate(program.faults)}
         self.arithmetic = ARITHMETIC_OF_TYPE[program.number_type]
@@ -72,9 +75,10 @@ class BlockCompiler:
         fixed = ("constant.", "solved.")
         scalars = [c for c in program.constants if c.name.startswith(fixed) and not c.items]
         self.fixed = {c.name: value(c.value) for c in scalars}
-        self.functions: dict[str, Callable[..., Any]] = {}
+        self.functions: dict[str, Callable[..., Any]] = dict(functions or {})
         for function in sorted(program.functions, key=lambda f: _call_depth(f, program.functions)):
-            self.functions[function.name] = self._compile_function(function)
+            if function.name not in self.functions:
+                self.functions[function.name] = self._compile_function(function)
         reals = [v.name for v in program.variables if v.type == "real"]
         reals += [c.name for c in program.constants if c.type == "real"]
         self.reals = frozenset(reals)

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from operator import itemgetter
 from typing import Any, Protocol
 
-from engine.interpreter.block_compiler import BlockCompiler
+from engine.interpreter.block_compiler import BlockCompiler, FunctionMap
 from engine.interpreter.expression_closures import Frame
 from engine.interpreter.number_arithmetic import ARITHMETIC_OF_TYPE
 from engine.interpreter.value_frame import RANGE_VIOLATIONS
@@ -39,13 +39,14 @@ class Stepper(Protocol):
 class Interpreter:
     """Executor of a Program with its own frame of values."""
 
-    def __init__(self, program: Program) -> None:
+    def __init__(self, program: Program, functions: FunctionMap | None = None) -> None:
         """Create a frame and run `derive` and `init`, as `X_Derive` and `X_Init` of the C code.
 
-        Variables are 0 or false before.
+        Variables are 0 or false before. `functions` replace elementary functions of the Program by
+        name; they get and return numbers of the number type.
         """
         self.program = program
-        compiler = _compile_program(program)
+        compiler = BlockCompiler(program, functions) if functions else _compile_program(program)
         self._slots = compiler.scope.slots
         self._blocks = compiler.blocks
         self._real = compiler.reals

@@ -1,9 +1,10 @@
 """Reference simulation: runs a system with the numerics of scipy and filterpy.
 
-Continuous instances are integrated by scipy (engine/reference/scipy_stepper.py). For sampled
-instances the solved numbers of observers are recomputed; models that a mode `runs` inside a tick
-keep the methods of the Program. The loop over instants is that of the engine, which accepts other
-steppers by the `Stepper` protocol.
+Continuous instances are integrated by scipy (engine/reference/scipy_stepper.py). Elementary
+functions are those of numpy (engine/reference/numpy_functions.py), except in constant expressions,
+which a Program contains as numbers. For sampled instances the solved numbers of observers are
+recomputed; models that a mode `runs` inside a tick keep the methods of the Program. The loop over
+instants is that of the engine, which accepts other steppers by the `Stepper` protocol.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from filterpy.common import van_loan_discretization
 from scipy import linalg
 
 from engine.interpreter.interpreter import Interpreter, Stepper
+from engine.reference.numpy_functions import numpy_functions
 from engine.reference.scipy_stepper import ScipyMethod, ScipyStepper
 from engine.results.array_types import Reals
 from engine.results.trajectory import Trajectory
@@ -49,11 +51,12 @@ def simulate_with_scipy(system: System, scenario: Scenario, method: ScipyMethod)
 def reference_stepper(program: Program, method: ScipyMethod = "DOP853") -> Stepper:
     """Return a `ScipyStepper` for a continuous Program, else an interpreter with reference numbers.
 
-    The numbers are those of `with_reference_numbers`, which may raise ValueError.
+    The numbers are those of `with_reference_numbers`, which may raise ValueError. Elementary
+    functions are those of numpy.
     """
     if program.period is None:
         return ScipyStepper(program, method)
-    return Interpreter(with_reference_numbers(program))
+    return Interpreter(with_reference_numbers(program), numpy_functions(program.number_type))
 
 
 def _scipy_integrated_stepper(program: Program, method: ScipyMethod) -> Stepper:

@@ -17,6 +17,7 @@ from scipy.integrate import solve_ivp
 
 from engine.execution.event_loop import SimulationStopped
 from engine.interpreter.interpreter import Interpreter
+from engine.reference.numpy_functions import numpy_functions
 from engine.results.array_types import Reals
 from language.ir.program import ModeInfo, Program, unqualified_name
 from language.ir.root_region import CHART
@@ -96,10 +97,14 @@ class ScipyStepper:
     """
 
     def __init__(self, program: Program, method: ScipyMethod = "DOP853") -> None:
-        """Create an interpreter of the Program without its integration blocks."""
+        """Create an interpreter of the Program without its integration blocks.
+
+        Its elementary functions are those of numpy.
+        """
         self.program = program
         self.method = method
-        self._inner = Interpreter(without_integration(program))
+        functions = numpy_functions(program.number_type)
+        self._inner = Interpreter(without_integration(program), functions)
         names = [v.name for v in program.variables if v.name.startswith("state.")]
         self._names = tuple(unqualified_name(name) for name in names)
         self._states = self._inner.make_reader(tuple(names))

@@ -98,7 +98,7 @@ void cruise_driver_Derive(const volatile cruise_driver_Cal *cal, cruise_driver_D
 
 void cruise_driver_Init(cruise_driver_Self *self, const volatile cruise_driver_Cal *cal)
 {
-    static const cruise_driver_Self zero; /* every member 0 or false */
+    static const cruise_driver_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     cruise_driver_Derive(cal, &self->derived);

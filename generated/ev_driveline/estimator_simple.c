@@ -605,7 +605,7 @@ void estimator_simple_Derive(const volatile estimator_simple_Cal *cal, estimator
 
 void estimator_simple_Init(estimator_simple_Self *self, const volatile estimator_simple_Cal *cal)
 {
-    static const estimator_simple_Self zero; /* every member 0 or false */
+    static const estimator_simple_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     estimator_simple_Derive(cal, &self->derived);

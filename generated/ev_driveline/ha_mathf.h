@@ -9,15 +9,20 @@
 #include <stdint.h>
 #include <string.h>
 
-float ha_sinf(float x); /* sine; |x| <= 1000 rad, clamped; error < 0.85 ULP */
-float ha_cosf(float x); /* cosine; |x| <= 1000 rad, clamped; error < 0.85 ULP */
+float ha_sinf(float x); /* sine; every x; error < 0.85 ULP */
+float ha_cosf(float x); /* cosine; every x; error < 0.85 ULP */
 float ha_expf(float x); /* e^x; -87 <= x <= 88, clamped; error < 0.95 ULP */
 float ha_tanhf(float x); /* hyperbolic tangent; every x; error < 1.4 ULP */
-float ha_tanf(float x); /* tangent; |x| <= 1000 rad, clamped; error < 2.4 ULP */
+float ha_tanf(float x); /* tangent; every x; error < 2.4 ULP */
 float ha_atan2f(float rise, float run); /* angle of (run, rise), in (-pi, pi] rad; error < 1.5 ULP */
 float ha_logf(float x); /* natural logarithm; 2^-126 <= x, clamped; error < 0.9 ULP */
 float ha_powf(float base, float degree); /* base^degree; base >= 0, its power within that of exp, clamped; error < 0.95 ULP */
 float ha_pow2f(float k); /* 2^k for a whole k from -126 to 127, else k */
+
+/* x = head + tail beyond a multiple of pi/2, quadrant 0 1 2 3: for |x| >= 2^9 */
+float ha_reduced_quadrantf(float x);
+float ha_reduced_headf(float x);
+float ha_reduced_tailf(float x);
 
 /* Tables: linear between points, held outside, NaN at NaN */
 float ha_lookupf(const float *axis, int32_t size, const float *values, float x);
@@ -62,18 +67,18 @@ static inline bool ha_withinf(float x, float low, float high)
     return (bits <= most) || ((bits >= sign) && ((bits & ~sign) <= (least & ~sign)));
 }
 
-/* A whole-valued x as a whole number, at most 2147483520 in size; a NaN is INT32_MIN */
+/* x towards 0 as a whole number; of larger sizes it is 2147483647 in size, of a NaN INT32_MIN */
 static inline int32_t ha_wholef(float x)
 {
-    const float largest = (float)2147483520;
+    const float limit = (float)2147483648U;
     int32_t whole = INT32_MIN;
 
-    if ((x >= -largest) && (x <= largest)) {
+    if ((x > -limit) && (x < limit)) {
         whole = (int32_t)x;
     } else if (x > 0.0F) {
-        whole = 2147483520;
+        whole = INT32_MAX;
     } else if (x < 0.0F) {
-        whole = -2147483520;
+        whole = -INT32_MAX;
     } else {
         /* NaN */
     }

@@ -70,7 +70,7 @@ void contactor_Derive(const volatile contactor_Cal *cal, contactor_Derived *deri
 
 void contactor_Init(contactor_Self *self, const volatile contactor_Cal *cal)
 {
-    static const contactor_Self zero; /* every member 0 or false */
+    static const contactor_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     contactor_Derive(cal, &self->derived);

@@ -24,7 +24,163 @@ float ha_pow2f(float k)
     return result;
 }
 
-/* sine; |x| <= 1000 rad, clamped; error < 0.85 ULP */
+/* 2/pi behind 2 words of zeros, 32 bits a word */
+static const uint32_t two_over_pi[12] = {
+0x00000000U, 0x00000000U, 0xA2F9836EU, 0x4E441529U, 0xFC2757D1U, 0xF534DDC0U, 0xDB629599U, 0x3C439041U,
+0xFE5163ABU, 0xDEBBC561U, 0xB7246E3AU, 0x424DD2E0U
+};
+
+/* The upper 64 bits of a product of 128 bits */
+static uint64_t upper_product(uint64_t a, uint64_t b)
+{
+    const uint64_t mask = 0xFFFFFFFFU;
+    const uint64_t low = (a & mask) * (b & mask);
+    const uint64_t inner = ((a >> 32U) * (b & mask)) + (low >> 32U);
+    const uint64_t outer = ((a & mask) * (b >> 32U)) + (inner & mask);
+
+    return ((a >> 32U) * (b >> 32U)) + (inner >> 32U) + (outer >> 32U);
+}
+
+/*
+ * x = head + tail beyond a multiple of pi/2, whose number modulo 4 is returned, for |x| >= 2^9.
+ * The product of x and 2/pi needs only those bits of 2/pi that lead to its lowest two bits before
+ * the point and to 126 bits behind it (Payne and Hanek 1983).
+ */
+static float reduce_far_angle(float x, float *head, float *tail)
+{
+    const uint64_t mask = 0xFFFFFFFFU;
+    const float sign = (x < 0.0F) ? -1.0F : 1.0F;
+    uint32_t bits;
+    uint64_t wide;
+    uint64_t mantissa;
+    uint32_t exponent;
+    uint32_t place;
+    uint64_t words[6];
+    uint64_t carry = 0U;
+    uint64_t right = 0U; /* the word of 2/pi to the right */
+    uint64_t high;
+    uint64_t low;
+    uint32_t quadrant;
+    int32_t zeros = 0;
+    bool is_above;
+    uint64_t angle;
+    uint64_t part;
+    int32_t power;
+    float size;
+
+    (void)memcpy(&bits, &x, sizeof bits);
+    wide = bits;
+    part = (wide >> 23U) & 255U;
+    exponent = (uint32_t)part;
+    mantissa = (wide & 0x7FFFFFU) | 0x800000U;
+    if (exponent > 254U) { /* an infinity: as the largest number */
+        exponent = 254U;
+        mantissa = 0xFFFFFFU;
+    }
+    exponent = (exponent < 136U) ? 136U : exponent;
+    place = exponent - 88U;
+
+    for (int32_t k = 6; k > 0; k--) {
+        const uint32_t at = (place >> 5U) + (uint32_t)k - 1U;
+        const uint32_t shift = 32U - (place & 31U);
+        const uint64_t left = two_over_pi[at];
+        const uint64_t next = two_over_pi[at + 1U];
+
+        words[k - 1] = (((left << 32U) | next) >> shift) & mask;
+    }
+    for (int32_t k = 6; k > 0; k--) {
+        const uint64_t a = (mantissa & mask) * words[k - 1];
+        const uint64_t b = (mantissa >> 32U) * right;
+        const uint64_t sum = (a & mask) + (b & mask) + (carry & mask);
+
+        carry = (a >> 32U) + (b >> 32U) + (carry >> 32U) + (sum >> 32U);
+        right = words[k - 1];
+        words[k - 1] = sum & mask;
+    }
+    high = (words[0] << 32U) | words[1];
+    low = (words[2] << 32U) | words[3];
+    part = high >> 62U;
+    quadrant = (uint32_t)part;
+    high = high & 0x3FFFFFFFFFFFFFFFU;
+    is_above = high >= 0x2000000000000000U;
+    if (is_above) { /* the next multiple is nearer */
+        quadrant = quadrant + 1U;
+        low = (low > 0U) ? ((UINT64_MAX - low) + 1U) : 0U;
+        high = ((low > 0U) ? 0x3FFFFFFFFFFFFFFFU : 0x4000000000000000U) - high;
+    }
+    /* The leading bit is moved to the highest place; no number needs more than 63 places */
+    if ((high >> 32U) == 0U) {
+        high = ((high & 0xFFFFFFFFU) << 32U) | (low >> 32U);
+        low = (low & 0xFFFFFFFFU) << 32U;
+        zeros = zeros + 32;
+    }
+    if ((high >> 48U) == 0U) {
+        high = ((high & 0xFFFFFFFFFFFFU) << 16U) | (low >> 48U);
+        low = (low & 0xFFFFFFFFFFFFU) << 16U;
+        zeros = zeros + 16;
+    }
+    if ((high >> 56U) == 0U) {
+        high = ((high & 0xFFFFFFFFFFFFFFU) << 8U) | (low >> 56U);
+        low = (low & 0xFFFFFFFFFFFFFFU) << 8U;
+        zeros = zeros + 8;
+    }
+    if ((high >> 60U) == 0U) {
+        high = ((high & 0xFFFFFFFFFFFFFFFU) << 4U) | (low >> 60U);
+        low = (low & 0xFFFFFFFFFFFFFFFU) << 4U;
+        zeros = zeros + 4;
+    }
+    if ((high >> 62U) == 0U) {
+        high = ((high & 0x3FFFFFFFFFFFFFFFU) << 2U) | (low >> 62U);
+        low = (low & 0x3FFFFFFFFFFFFFFFU) << 2U;
+        zeros = zeros + 2;
+    }
+    if ((high >> 63U) == 0U) {
+        high = ((high & 0x7FFFFFFFFFFFFFFFU) << 1U) | (low >> 63U);
+        low = (low & 0x7FFFFFFFFFFFFFFFU) << 1U;
+        zeros = zeros + 1;
+    }
+    angle = upper_product(high, 0xC90FDAA22168C235U); /* pi/2 * 2^63 */
+    size = is_above ? -sign : sign;
+    part = angle >> 40U;
+    power = -21 - zeros;
+    *head = size * ((float)part * ha_pow2f((float)power));
+    part = (angle >> 16U) & 0xFFFFFFU;
+    power = -45 - zeros;
+    *tail = size * ((float)part * ha_pow2f((float)power));
+    if (x < 0.0F) {
+        quadrant = 8U - quadrant;
+    }
+    quadrant = quadrant & 3U;
+    return (float)quadrant;
+}
+
+float ha_reduced_quadrantf(float x)
+{
+    float head;
+    float tail;
+
+    return reduce_far_angle(x, &head, &tail);
+}
+
+float ha_reduced_headf(float x)
+{
+    float head;
+    float tail;
+
+    (void)reduce_far_angle(x, &head, &tail);
+    return head;
+}
+
+float ha_reduced_tailf(float x)
+{
+    float head;
+    float tail;
+
+    (void)reduce_far_angle(x, &head, &tail);
+    return tail;
+}
+
+/* sine; every x; error < 0.85 ULP */
 float ha_sinf(float x)
 {
     float bounded;
@@ -37,15 +193,18 @@ float ha_sinf(float x)
     }
     const float quarters = (bounded * 0.63661975F) + 12582912.0F - 12582912.0F;
     const float turns = (0.25F * quarters) - 0.375F + 12582912.0F - 12582912.0F;
-    const float quadrant = quarters - (4.0F * turns);
+    const float side = quarters - (4.0F * turns);
     const float coarse = bounded - (quarters * 1.5708008F);
     const float fine = quarters * (-4.455447e-06F);
     const float finer = quarters * 9.922587e-10F;
     const float first = coarse - fine;
     const float lost = coarse - first - fine;
-    const float head = first - finer;
-    const float rest = first - head - finer;
-    const float tail = lost + rest - (quarters * (-1.6513996e-13F));
+    const float near = first - finer;
+    const float rest = first - near - finer;
+    const float quadrant = (fabsf(x) > 1000.0F) ? ha_reduced_quadrantf(x) : side;
+    const float head = (fabsf(x) > 1000.0F) ? ha_reduced_headf(x) : near;
+    const float tail = (fabsf(x) > 1000.0F) ? ha_reduced_tailf(x) : (lost + rest
+        - (quarters * (-1.6513996e-13F)));
     const float square = head * head;
     const float half = 0.5F * square;
     const float crest = 1.0F - half;
@@ -71,7 +230,7 @@ float ha_sinf(float x)
     return y;
 }
 
-/* cosine; |x| <= 1000 rad, clamped; error < 0.85 ULP */
+/* cosine; every x; error < 0.85 ULP */
 float ha_cosf(float x)
 {
     float bounded;
@@ -84,15 +243,18 @@ float ha_cosf(float x)
     }
     const float quarters = (bounded * 0.63661975F) + 12582912.0F - 12582912.0F;
     const float turns = (0.25F * quarters) - 0.375F + 12582912.0F - 12582912.0F;
-    const float quadrant = quarters - (4.0F * turns);
+    const float side = quarters - (4.0F * turns);
     const float coarse = bounded - (quarters * 1.5708008F);
     const float fine = quarters * (-4.455447e-06F);
     const float finer = quarters * 9.922587e-10F;
     const float first = coarse - fine;
     const float lost = coarse - first - fine;
-    const float head = first - finer;
-    const float rest = first - head - finer;
-    const float tail = lost + rest - (quarters * (-1.6513996e-13F));
+    const float near = first - finer;
+    const float rest = first - near - finer;
+    const float quadrant = (fabsf(x) > 1000.0F) ? ha_reduced_quadrantf(x) : side;
+    const float head = (fabsf(x) > 1000.0F) ? ha_reduced_headf(x) : near;
+    const float tail = (fabsf(x) > 1000.0F) ? ha_reduced_tailf(x) : (lost + rest
+        - (quarters * (-1.6513996e-13F)));
     const float square = head * head;
     const float half = 0.5F * square;
     const float crest = 1.0F - half;
@@ -161,7 +323,7 @@ float ha_tanhf(float x)
     return y;
 }
 
-/* tangent; |x| <= 1000 rad, clamped; error < 2.4 ULP */
+/* tangent; every x; error < 2.4 ULP */
 float ha_tanf(float x)
 {
     float bounded;
@@ -174,15 +336,18 @@ float ha_tanf(float x)
     }
     const float quarters = (bounded * 0.63661975F) + 12582912.0F - 12582912.0F;
     const float turns = (0.25F * quarters) - 0.375F + 12582912.0F - 12582912.0F;
-    const float quadrant = quarters - (4.0F * turns);
+    const float side = quarters - (4.0F * turns);
     const float coarse = bounded - (quarters * 1.5708008F);
     const float fine = quarters * (-4.455447e-06F);
     const float finer = quarters * 9.922587e-10F;
     const float first = coarse - fine;
     const float lost = coarse - first - fine;
-    const float head = first - finer;
-    const float rest = first - head - finer;
-    const float tail = lost + rest - (quarters * (-1.6513996e-13F));
+    const float near = first - finer;
+    const float rest = first - near - finer;
+    const float quadrant = (fabsf(x) > 1000.0F) ? ha_reduced_quadrantf(x) : side;
+    const float head = (fabsf(x) > 1000.0F) ? ha_reduced_headf(x) : near;
+    const float tail = (fabsf(x) > 1000.0F) ? ha_reduced_tailf(x) : (lost + rest
+        - (quarters * (-1.6513996e-13F)));
     const float square = head * head;
     const float half = 0.5F * square;
     const float crest = 1.0F - half;

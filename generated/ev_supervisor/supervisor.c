@@ -1895,7 +1895,7 @@ void supervisor_Derive(const volatile supervisor_Cal *cal, supervisor_Derived *d
 
 void supervisor_Init(supervisor_Self *self, const volatile supervisor_Cal *cal)
 {
-    static const supervisor_Self zero; /* every member 0 or false */
+    static const supervisor_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     supervisor_Derive(cal, &self->derived);
@@ -1925,7 +1925,7 @@ void supervisor_Calibrate(supervisor_Self *self, const volatile supervisor_Cal *
 void supervisor_Step(supervisor_Self *self, const volatile supervisor_Cal *cal,
     const supervisor_In *in, supervisor_Out *out)
 {
-    static const supervisor_Work nothing; /* every member 0 or false */
+    static const supervisor_Work nothing = {0}; /* every member 0 or false */
     supervisor_Work *const work = &self->work;
 
     *work = nothing;

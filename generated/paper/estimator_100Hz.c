@@ -605,7 +605,7 @@ void estimator_100Hz_Derive(const volatile estimator_100Hz_Cal *cal, estimator_1
 
 void estimator_100Hz_Init(estimator_100Hz_Self *self, const volatile estimator_100Hz_Cal *cal)
 {
-    static const estimator_100Hz_Self zero; /* every member 0 or false */
+    static const estimator_100Hz_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     estimator_100Hz_Derive(cal, &self->derived);

@@ -24,7 +24,166 @@ double ha_pow2(double k)
     return result;
 }
 
-/* sine; |x| <= 1e5 rad, clamped; error < 0.85 ULP */
+/* 2/pi behind 2 words of zeros, 32 bits a word */
+static const uint32_t two_over_pi[39] = {
+0x00000000U, 0x00000000U, 0xA2F9836EU, 0x4E441529U, 0xFC2757D1U, 0xF534DDC0U, 0xDB629599U, 0x3C439041U,
+0xFE5163ABU, 0xDEBBC561U, 0xB7246E3AU, 0x424DD2E0U, 0x06492EEAU, 0x09D1921CU, 0xFE1DEB1CU, 0xB129A73EU,
+0xE88235F5U, 0x2EBB4484U, 0xE99C7026U, 0xB45F7E41U, 0x3991D639U, 0x835339F4U, 0x9C845F8BU, 0xBDF9283BU,
+0x1FF897FFU, 0xDE05980FU, 0xEF2F118BU, 0x5A0A6D1FU, 0x6D367ECFU, 0x27CB09B7U, 0x4F463F66U, 0x9E5FEA2DU,
+0x7527BAC7U, 0xEBE5F17BU, 0x3D0739F7U, 0x8A5292EAU, 0x6BFB5FB1U, 0x1F8D5D08U, 0x56033046U
+};
+
+/* The upper 64 bits of a product of 128 bits */
+static uint64_t upper_product(uint64_t a, uint64_t b)
+{
+    const uint64_t mask = 0xFFFFFFFFU;
+    const uint64_t low = (a & mask) * (b & mask);
+    const uint64_t inner = ((a >> 32U) * (b & mask)) + (low >> 32U);
+    const uint64_t outer = ((a & mask) * (b >> 32U)) + (inner & mask);
+
+    return ((a >> 32U) * (b >> 32U)) + (inner >> 32U) + (outer >> 32U);
+}
+
+/*
+ * x = head + tail beyond a multiple of pi/2, whose number modulo 4 is returned, for |x| >= 2^16.
+ * The product of x and 2/pi needs only those bits of 2/pi that lead to its lowest two bits before
+ * the point and to 126 bits behind it (Payne and Hanek 1983).
+ */
+static double reduce_far_angle(double x, double *head, double *tail)
+{
+    const uint64_t mask = 0xFFFFFFFFU;
+    const double sign = (x < 0.0) ? -1.0 : 1.0;
+    uint64_t bits;
+    uint64_t wide;
+    uint64_t mantissa;
+    uint32_t exponent;
+    uint32_t place;
+    uint64_t words[6];
+    uint64_t carry = 0U;
+    uint64_t right = 0U; /* the word of 2/pi to the right */
+    uint64_t high;
+    uint64_t low;
+    uint32_t quadrant;
+    int32_t zeros = 0;
+    bool is_above;
+    uint64_t angle;
+    uint64_t part;
+    int32_t power;
+    double size;
+
+    (void)memcpy(&bits, &x, sizeof bits);
+    wide = bits;
+    part = (wide >> 52U) & 2047U;
+    exponent = (uint32_t)part;
+    mantissa = (wide & 0xFFFFFFFFFFFFFU) | 0x10000000000000U;
+    if (exponent > 2046U) { /* an infinity: as the largest number */
+        exponent = 2046U;
+        mantissa = 0x1FFFFFFFFFFFFFU;
+    }
+    exponent = (exponent < 1039U) ? 1039U : exponent;
+    place = exponent - 1013U;
+
+    for (int32_t k = 6; k > 0; k--) {
+        const uint32_t at = (place >> 5U) + (uint32_t)k - 1U;
+        const uint32_t shift = 32U - (place & 31U);
+        const uint64_t left = two_over_pi[at];
+        const uint64_t next = two_over_pi[at + 1U];
+
+        words[k - 1] = (((left << 32U) | next) >> shift) & mask;
+    }
+    for (int32_t k = 6; k > 0; k--) {
+        const uint64_t a = (mantissa & mask) * words[k - 1];
+        const uint64_t b = (mantissa >> 32U) * right;
+        const uint64_t sum = (a & mask) + (b & mask) + (carry & mask);
+
+        carry = (a >> 32U) + (b >> 32U) + (carry >> 32U) + (sum >> 32U);
+        right = words[k - 1];
+        words[k - 1] = sum & mask;
+    }
+    high = (words[0] << 32U) | words[1];
+    low = (words[2] << 32U) | words[3];
+    part = high >> 62U;
+    quadrant = (uint32_t)part;
+    high = high & 0x3FFFFFFFFFFFFFFFU;
+    is_above = high >= 0x2000000000000000U;
+    if (is_above) { /* the next multiple is nearer */
+        quadrant = quadrant + 1U;
+        low = (low > 0U) ? ((UINT64_MAX - low) + 1U) : 0U;
+        high = ((low > 0U) ? 0x3FFFFFFFFFFFFFFFU : 0x4000000000000000U) - high;
+    }
+    /* The leading bit is moved to the highest place; no number needs more than 63 places */
+    if ((high >> 32U) == 0U) {
+        high = ((high & 0xFFFFFFFFU) << 32U) | (low >> 32U);
+        low = (low & 0xFFFFFFFFU) << 32U;
+        zeros = zeros + 32;
+    }
+    if ((high >> 48U) == 0U) {
+        high = ((high & 0xFFFFFFFFFFFFU) << 16U) | (low >> 48U);
+        low = (low & 0xFFFFFFFFFFFFU) << 16U;
+        zeros = zeros + 16;
+    }
+    if ((high >> 56U) == 0U) {
+        high = ((high & 0xFFFFFFFFFFFFFFU) << 8U) | (low >> 56U);
+        low = (low & 0xFFFFFFFFFFFFFFU) << 8U;
+        zeros = zeros + 8;
+    }
+    if ((high >> 60U) == 0U) {
+        high = ((high & 0xFFFFFFFFFFFFFFFU) << 4U) | (low >> 60U);
+        low = (low & 0xFFFFFFFFFFFFFFFU) << 4U;
+        zeros = zeros + 4;
+    }
+    if ((high >> 62U) == 0U) {
+        high = ((high & 0x3FFFFFFFFFFFFFFFU) << 2U) | (low >> 62U);
+        low = (low & 0x3FFFFFFFFFFFFFFFU) << 2U;
+        zeros = zeros + 2;
+    }
+    if ((high >> 63U) == 0U) {
+        high = ((high & 0x7FFFFFFFFFFFFFFFU) << 1U) | (low >> 63U);
+        low = (low & 0x7FFFFFFFFFFFFFFFU) << 1U;
+        zeros = zeros + 1;
+    }
+    angle = upper_product(high, 0xC90FDAA22168C235U); /* pi/2 * 2^63 */
+    size = is_above ? -sign : sign;
+    part = angle >> 11U;
+    power = -50 - zeros;
+    *head = size * ((double)part * ha_pow2((double)power));
+    part = (angle >> 0U) & 0x7FFU;
+    power = -61 - zeros;
+    *tail = size * ((double)part * ha_pow2((double)power));
+    if (x < 0.0) {
+        quadrant = 8U - quadrant;
+    }
+    quadrant = quadrant & 3U;
+    return (double)quadrant;
+}
+
+double ha_reduced_quadrant(double x)
+{
+    double head;
+    double tail;
+
+    return reduce_far_angle(x, &head, &tail);
+}
+
+double ha_reduced_head(double x)
+{
+    double head;
+    double tail;
+
+    (void)reduce_far_angle(x, &head, &tail);
+    return head;
+}
+
+double ha_reduced_tail(double x)
+{
+    double head;
+    double tail;
+
+    (void)reduce_far_angle(x, &head, &tail);
+    return tail;
+}
+
+/* sine; every x; error < 0.85 ULP */
 double ha_sin(double x)
 {
     double bounded;
@@ -38,12 +197,15 @@ double ha_sin(double x)
     const double quarters =
         (bounded * 0.6366197723675814) + 6755399441055744.0 - 6755399441055744.0;
     const double turns = (0.25 * quarters) - 0.375 + 6755399441055744.0 - 6755399441055744.0;
-    const double quadrant = quarters - (4.0 * turns);
+    const double side = quarters - (4.0 * turns);
     const double coarse = bounded - (quarters * 1.5707963267923333);
     const double fine = quarters * 2.563344151689835e-12;
-    const double head = coarse - fine;
-    const double lost = coarse - head - fine;
-    const double tail = lost - (quarters * (-9.531611933980011e-23));
+    const double near = coarse - fine;
+    const double lost = coarse - near - fine;
+    const double quadrant = (fabs(x) > 100000.0) ? ha_reduced_quadrant(x) : side;
+    const double head = (fabs(x) > 100000.0) ? ha_reduced_head(x) : near;
+    const double tail = (fabs(x) > 100000.0) ? ha_reduced_tail(x) : (lost
+        - (quarters * (-9.531611933980011e-23)));
     const double square = head * head;
     const double half = 0.5 * square;
     const double crest = 1.0 - half;
@@ -73,7 +235,7 @@ double ha_sin(double x)
     return y;
 }
 
-/* cosine; |x| <= 1e5 rad, clamped; error < 0.85 ULP */
+/* cosine; every x; error < 0.85 ULP */
 double ha_cos(double x)
 {
     double bounded;
@@ -87,12 +249,15 @@ double ha_cos(double x)
     const double quarters =
         (bounded * 0.6366197723675814) + 6755399441055744.0 - 6755399441055744.0;
     const double turns = (0.25 * quarters) - 0.375 + 6755399441055744.0 - 6755399441055744.0;
-    const double quadrant = quarters - (4.0 * turns);
+    const double side = quarters - (4.0 * turns);
     const double coarse = bounded - (quarters * 1.5707963267923333);
     const double fine = quarters * 2.563344151689835e-12;
-    const double head = coarse - fine;
-    const double lost = coarse - head - fine;
-    const double tail = lost - (quarters * (-9.531611933980011e-23));
+    const double near = coarse - fine;
+    const double lost = coarse - near - fine;
+    const double quadrant = (fabs(x) > 100000.0) ? ha_reduced_quadrant(x) : side;
+    const double head = (fabs(x) > 100000.0) ? ha_reduced_head(x) : near;
+    const double tail = (fabs(x) > 100000.0) ? ha_reduced_tail(x) : (lost
+        - (quarters * (-9.531611933980011e-23)));
     const double square = head * head;
     const double half = 0.5 * square;
     const double crest = 1.0 - half;
@@ -171,7 +336,7 @@ double ha_tanh(double x)
     return y;
 }
 
-/* tangent; |x| <= 1e5 rad, clamped; error < 2.4 ULP */
+/* tangent; every x; error < 2.4 ULP */
 double ha_tan(double x)
 {
     double bounded;
@@ -185,12 +350,15 @@ double ha_tan(double x)
     const double quarters =
         (bounded * 0.6366197723675814) + 6755399441055744.0 - 6755399441055744.0;
     const double turns = (0.25 * quarters) - 0.375 + 6755399441055744.0 - 6755399441055744.0;
-    const double quadrant = quarters - (4.0 * turns);
+    const double side = quarters - (4.0 * turns);
     const double coarse = bounded - (quarters * 1.5707963267923333);
     const double fine = quarters * 2.563344151689835e-12;
-    const double head = coarse - fine;
-    const double lost = coarse - head - fine;
-    const double tail = lost - (quarters * (-9.531611933980011e-23));
+    const double near = coarse - fine;
+    const double lost = coarse - near - fine;
+    const double quadrant = (fabs(x) > 100000.0) ? ha_reduced_quadrant(x) : side;
+    const double head = (fabs(x) > 100000.0) ? ha_reduced_head(x) : near;
+    const double tail = (fabs(x) > 100000.0) ? ha_reduced_tail(x) : (lost
+        - (quarters * (-9.531611933980011e-23)));
     const double square = head * head;
     const double half = 0.5 * square;
     const double crest = 1.0 - half;

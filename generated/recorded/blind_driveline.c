@@ -1450,7 +1450,7 @@ void blind_driveline_Derive(const volatile blind_driveline_Cal *cal, blind_drive
 
 void blind_driveline_Init(blind_driveline_Self *self, const volatile blind_driveline_Cal *cal)
 {
-    static const blind_driveline_Self zero; /* every member 0 or false */
+    static const blind_driveline_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     blind_driveline_Derive(cal, &self->derived);

@@ -208,7 +208,7 @@ void bmw_i3_Derive(const volatile bmw_i3_Cal *cal, bmw_i3_Derived *derived)
 
 void bmw_i3_Init(bmw_i3_Self *self, const volatile bmw_i3_Cal *cal)
 {
-    static const bmw_i3_Self zero; /* every member 0 or false */
+    static const bmw_i3_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     bmw_i3_Derive(cal, &self->derived);

@@ -715,7 +715,7 @@ void brfd_damper_Derive(const volatile brfd_damper_Cal *cal, brfd_damper_Derived
 
 void brfd_damper_Init(brfd_damper_Self *self, const volatile brfd_damper_Cal *cal)
 {
-    static const brfd_damper_Self zero; /* every member 0 or false */
+    static const brfd_damper_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     brfd_damper_Derive(cal, &self->derived);

@@ -235,7 +235,7 @@ void emps_Derive(const volatile emps_Cal *cal, emps_Derived *derived)
 
 void emps_Init(emps_Self *self, const volatile emps_Cal *cal)
 {
-    static const emps_Self zero; /* every member 0 or false */
+    static const emps_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     emps_Derive(cal, &self->derived);

@@ -9,15 +9,20 @@
 #include <stdint.h>
 #include <string.h>
 
-double ha_sin(double x); /* sine; |x| <= 1e5 rad, clamped; error < 0.85 ULP */
-double ha_cos(double x); /* cosine; |x| <= 1e5 rad, clamped; error < 0.85 ULP */
+double ha_sin(double x); /* sine; every x; error < 0.85 ULP */
+double ha_cos(double x); /* cosine; every x; error < 0.85 ULP */
 double ha_exp(double x); /* e^x; -708 <= x <= 709, clamped; error < 0.95 ULP */
 double ha_tanh(double x); /* hyperbolic tangent; every x; error < 1.4 ULP */
-double ha_tan(double x); /* tangent; |x| <= 1e5 rad, clamped; error < 2.4 ULP */
+double ha_tan(double x); /* tangent; every x; error < 2.4 ULP */
 double ha_atan2(double rise, double run); /* angle of (run, rise), in (-pi, pi] rad; error < 1.5 ULP */
 double ha_log(double x); /* natural logarithm; 2^-1022 <= x, clamped; error < 0.9 ULP */
 double ha_pow(double base, double degree); /* base^degree; base >= 0, its power within that of exp, clamped; error < 0.95 ULP */
 double ha_pow2(double k); /* 2^k for a whole k from -1022 to 1023, else k */
+
+/* x = head + tail beyond a multiple of pi/2, quadrant 0 1 2 3: for |x| >= 2^16 */
+double ha_reduced_quadrant(double x);
+double ha_reduced_head(double x);
+double ha_reduced_tail(double x);
 
 /* Tables: linear between points, held outside, NaN at NaN */
 double ha_lookup(const double *axis, int32_t size, const double *values, double x);
@@ -62,18 +67,18 @@ static inline bool ha_within(double x, double low, double high)
     return (bits <= most) || ((bits >= sign) && ((bits & ~sign) <= (least & ~sign)));
 }
 
-/* A whole-valued x as a whole number, at most 2147483520 in size; a NaN is INT32_MIN */
+/* x towards 0 as a whole number; of larger sizes it is 2147483647 in size, of a NaN INT32_MIN */
 static inline int32_t ha_whole(double x)
 {
-    const double largest = (double)2147483520;
+    const double limit = (double)2147483648U;
     int32_t whole = INT32_MIN;
 
-    if ((x >= -largest) && (x <= largest)) {
+    if ((x > -limit) && (x < limit)) {
         whole = (int32_t)x;
     } else if (x > 0.0) {
-        whole = 2147483520;
+        whole = INT32_MAX;
     } else if (x < 0.0) {
-        whole = -2147483520;
+        whole = -INT32_MAX;
     } else {
         /* NaN */
     }

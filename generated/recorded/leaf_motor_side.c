@@ -232,7 +232,7 @@ void leaf_motor_side_Derive(const volatile leaf_motor_side_Cal *cal, leaf_motor_
 
 void leaf_motor_side_Init(leaf_motor_side_Self *self, const volatile leaf_motor_side_Cal *cal)
 {
-    static const leaf_motor_side_Self zero; /* every member 0 or false */
+    static const leaf_motor_side_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     leaf_motor_side_Derive(cal, &self->derived);

@@ -266,7 +266,7 @@ void leaf_vehicle_Derive(const volatile leaf_vehicle_Cal *cal, leaf_vehicle_Deri
 
 void leaf_vehicle_Init(leaf_vehicle_Self *self, const volatile leaf_vehicle_Cal *cal)
 {
-    static const leaf_vehicle_Self zero; /* every member 0 or false */
+    static const leaf_vehicle_Self zero = {0}; /* every member 0 or false */
 
     *self = zero;
     leaf_vehicle_Derive(cal, &self->derived);

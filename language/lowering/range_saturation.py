@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from fractions import Fraction
 
+from language.expressions.syntax_tree import FunctionCall, walk
 from language.ir.ops import (
     Assign,
     Binary,
@@ -29,10 +30,12 @@ from language.ir.ops import (
     subtract,
 )
 from language.ir.program import Variable, value_type
+from language.ir.traversal import subexpressions
 from language.model.automaton import Automaton
 from language.model.declaration import Input, Range, State
 from language.numerics.evaluate import INTEGER_OF_NAN
 from language.text.diagnostic import Problems
+from language.typecheck.types import MAX_INT
 
 MAX_FAULT_BITS = 32
 """The number of fault bits of an instance, which are one uint32 word."""
@@ -147,7 +150,7 @@ def initialise_latched_inputs(automaton: Automaton) -> list[Op]:
     return ops
 
 
-def bound_literals(variable: Input | State) -> tuple[Expr, Expr]:
+def bound_literals(variable: Input | State) -> tuple[Value, Value]:
     """Return the lower and the upper bound of a range as literals of the variable's type.
 
     They are (0, 0) without a range.
@@ -164,20 +167,45 @@ def assign_saturated(
     A value that is no variable, or is the target itself, is stored in `work.new_<name>` first. A
     value outside the range sets the fault bit; the policy then clips it, takes the fallback or
     keeps the old value. It requests the fault mode, if there is one, for `on_range: fault` and for
-    a real input that is not finite.
+    a real input that is not finite. A range that ends at +-MAX_INT does not contain this end if the
+    value may be a converted real, because one too large for the type is converted to it (rule C8).
     """
     ops: list[Op] = []
+    is_converted = _may_be_converted(automaton, variable, value)
     if not isinstance(value, Ref) or value.name == target:
         new = Ref(f"work.new_{variable.name}", value_type(variable.type) == "whole")
         ops.append(Assign(new.name, value, key))
         value, key = new, ""
     low, high = bound_literals(variable)
-    inside = Binary("and", Compare(">=", value, low), Compare("<=", value, high))
+    above = Compare(">" if is_converted and low.value == -MAX_INT else ">=", value, low)
+    below = Compare("<" if is_converted and high.value == MAX_INT else "<=", value, high)
+    inside = Binary("and", above, below)
     outside: list[Op] = [FaultBit(range_fault_of(variable), variable.name)]
     outside += _assign_out_of_range(variable, target, value)
     outside += _request_fault_mode(automaton, variable, value)
     ops.append(Branch(inside, (Assign(target, value, key),), tuple(outside)))
     return ops
+
+
+def _may_be_converted(automaton: Automaton, variable: Input | State, value: Expr) -> bool:
+    """Return whether the value of an int may come from `floor(...)` of a real.
+
+    For a variable, such as the value of a stage, it is whether an assignment of the automaton to
+    the int contains a `floor`.
+    """
+    if variable.type != "int" or isinstance(variable, Input):
+        return False
+    if not isinstance(value, Ref):
+        return any(
+            isinstance(part, Call) and part.function == "whole" for part in subexpressions(value)
+        )
+    return any(
+        isinstance(part, FunctionCall) and part.function == "floor"
+        for mode in automaton.all_modes
+        for formulas in (mode.update, mode.entry, mode.exit, *(t.reset for t in mode.transitions))
+        if variable.name in formulas
+        for part in walk(formulas[variable.name].tree)
+    )
 
 
 def saturable_variables(automaton: Automaton) -> list[Input | State]:

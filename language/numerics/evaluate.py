@@ -12,6 +12,8 @@ from language.ir.number_type import ROUNDING_FUNCTIONS, NumberType, round_to_flo
 from language.ir.ops import Assign, Binary, Call, Compare, Expr, Item, Ref, Select, Unary, Value
 from language.numerics.function_table import FUNCTIONS_BY_TYPE
 from language.numerics.interpolation import Interpolation
+from language.numerics.payne_hanek import reduction_operations
+from language.typecheck.types import MAX_INT
 
 ARITHMETIC: Mapping[str, Callable[[Any, Any], Any]] = {
     "+": operator.add,
@@ -84,21 +86,19 @@ def power_of_two(k: float) -> float:
     return math.ldexp(1.0, int(k)) if -1022.0 <= k <= 1023.0 else k
 
 
-MAX_FLOAT32_INTEGER = 2147483520
-"""Largest result of a conversion to a whole number: 2^31 - 128, which is exact in float32."""
-
 INTEGER_OF_NAN = -(2**31)
 """Result of the conversion of a NaN: outside every range, so that a saturation detects it."""
 
 
 def to_integer(x: float) -> int:
-    """Return a real, truncated towards 0, as a whole number within +-MAX_FLOAT32_INTEGER (rule C8).
+    """Return a real, truncated towards 0, as a whole number of 32 bits (rule C8).
 
-    Larger numbers and infinities give that limit. A NaN gives INTEGER_OF_NAN.
+    It is within +-MAX_INT: larger numbers and infinities give that limit. A NaN gives
+    INTEGER_OF_NAN.
     """
-    if -MAX_FLOAT32_INTEGER <= x <= MAX_FLOAT32_INTEGER:
+    if abs(x) < MAX_INT + 1:
         return int(x)
-    return MAX_FLOAT32_INTEGER if x > 0.0 else (-MAX_FLOAT32_INTEGER if x < 0.0 else INTEGER_OF_NAN)
+    return MAX_INT if x > 0.0 else (-MAX_INT if x < 0.0 else INTEGER_OF_NAN)
 
 
 def power_of_two_float32(k: float) -> float:
@@ -131,15 +131,19 @@ One further rounding of a result therefore gives the result in float32.
 """
 
 ELEMENTARY_BY_TYPE: Mapping[NumberType, FunctionMap] = {
-    "float64": ELEMENTARY,
+    "float64": {**ELEMENTARY, **reduction_operations("float64")},
     "float32": {
         **ELEMENTARY,
+        **reduction_operations("float32"),
         "pow2": power_of_two_float32,
         "lookup": Interpolation(round_to_float32).lookup,
         "lookup2": Interpolation(round_to_float32).lookup2,
     },
 }
-"""Elementary operations of each number type, before the rounding of their result to the type."""
+"""Elementary operations of each number type, before the rounding of their result to the type.
+
+To those that specs and Programs call they add those that only elementary functions call.
+"""
 
 BINARY_OPERATIONS: Mapping[str, Callable[[Scalar, Scalar], Scalar]] = {
     **ARITHMETIC,
@@ -189,12 +193,12 @@ def evaluate(
 def apply_function(
     function: str, arguments: list[Scalar], number_type: NumberType = "float64"
 ) -> Scalar:
-    """Return the value of an operation in ELEMENTARY or of a function in FUNCTIONS_BY_TYPE.
+    """Return the value of an operation in ELEMENTARY_BY_TYPE or of a function.
 
     The result and each operation of a function are rounded to the number type. Results of functions
     are cached, except with an argument of 0. Raises KeyError for an unknown function.
     """
-    if function in ELEMENTARY:
+    if function in ELEMENTARY_BY_TYPE[number_type]:
         return round_if_real(ELEMENTARY_BY_TYPE[number_type][function](*arguments), number_type)
     values = tuple(arguments)
     if 0.0 in values:  # the cache does not distinguish -0.0 from 0.0

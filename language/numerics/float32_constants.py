@@ -20,6 +20,7 @@ from language.numerics.sin_cos_tanh import (
     TanhConstants,
     TrigConstants,
     count_quarter_turns,
+    select_reduction,
     sin_cos_kernels,
 )
 from language.numerics.tan_atan2 import Atan2Constants
@@ -49,7 +50,7 @@ so on upwards.
 """
 
 MAX_ANGLE = 1000.0
-"""Bound of the argument of sin and cos [rad]: 637 quarter turns, fewer than 2^10."""
+"""Bound of the angles [rad] that are reduced by parts of pi/2: 637 quarter turns, below 2^10."""
 TWO_OVER_PI = real(0.6366197466850281)
 HALF_PI_PARTS = (
     real(1.57080078125),
@@ -88,7 +89,7 @@ def reduce_angle_float32(body: FunctionBuilder) -> tuple[Ref, Ref, Ref]:
 
     x is head + tail beyond a multiple of pi/2. `coarse`, `fine` and `finer` are exact. Two
     differences with their rounding errors (Dekker's fast two-sum) leave head + tail within 2^-56 of
-    the reduced argument, which is 2^-30 or more.
+    the reduced argument, which is 2^-30 or more. Angles above MAX_ANGLE are reduced by integers.
     """
     bounded, quarters, quadrant = count_quarter_turns(
         body, MAX_ANGLE, TWO_OVER_PI, ROUNDING_CONSTANT
@@ -98,17 +99,16 @@ def reduce_angle_float32(body: FunctionBuilder) -> tuple[Ref, Ref, Ref]:
     finer = body.let("finer", multiply(quarters, HALF_PI_PARTS[2]))
     first = body.let("first", subtract(coarse, fine))
     lost = body.let("lost", subtract(subtract(coarse, first), fine))
-    head = body.let("head", subtract(first, finer))
-    rest = body.let("rest", subtract(subtract(first, head), finer))
-    tail = body.let("tail", subtract(add(lost, rest), multiply(quarters, HALF_PI_PARTS[3])))
-    return quadrant, head, tail
+    near = body.let("near", subtract(first, finer))
+    rest = body.let("rest", subtract(subtract(first, near), finer))
+    last = subtract(add(lost, rest), multiply(quarters, HALF_PI_PARTS[3]))
+    return select_reduction(body, MAX_ANGLE, (quadrant, near, last))
 
 
 TRIG_FLOAT32 = TrigConstants(
     reduce_angle_float32,
     partial(sin_cos_kernels, sine_series=SIN_SERIES, cosine_series=COS_SERIES),
     TINY_ARGUMENT,
-    "1000",
 )
 EXP_FLOAT32 = ExpConstants(
     EXP_LOWEST, EXP_HIGHEST, real(-126.0), PER_LN_2, LN_2, EXP_SERIES, ROUNDING_CONSTANT

@@ -5,7 +5,8 @@ No library of mathematics is used, because its results depend on the processor a
 two. IEEE 754 defines each of them to the last bit; compiled without contraction (rule C3), C gives
 the bits of Python.
 
-Arguments are clamped to the declared domain. A NaN gives a NaN, but never reaches `pow2`. sin and
+Arguments of tanh are clamped to its declared domain; sin, cos and tan accept every angle, and an
+infinity as the largest number. A NaN gives a NaN, but never reaches `pow2`. sin and
 tanh are odd and cos is even, bit for bit; sin and tanh of -0.0 are -0.0. The errors in `about`, in
 ULP of the exact result, were measured: against mpmath by the test of this module, and once against
 libquadmath at 10^8 arguments of each function. They hold on the whole domain, also at the zeros of
@@ -41,7 +42,8 @@ TINY_ARGUMENT = real(2.0**-27)
 """Below it sin x and tanh x equal x to 2^-54 / 3 relative; -0.0 and subnormals are kept."""
 
 MAX_ANGLE = 1e5
-"""Bound of the argument of sin and cos [rad]: 63 662 quarter turns, fewer than 2^16."""
+"""Bound of the angles [rad] that are reduced by parts of pi/2: 63 662 quarter turns, fewer than
+2^16. Larger angles are reduced by payne_hanek.py."""
 TWO_OVER_PI = real(0.6366197723675814)
 HALF_PI_PARTS = real(1.5707963267923333), real(2.563344151689835e-12), real(-9.531611933980011e-23)
 """pi/2 in three parts, together within 2^-127; the first two are multiples of 2^-36 and 2^-72."""
@@ -118,13 +120,12 @@ class TrigConstants:
     """The constants and steps of sin, cos and tan for one number type.
 
     `reduce_angle` appends the argument reduction, `kernels` sin and cos of head + tail. Below
-    `tiny`, sin and tan of x are x. `bound_text` is the bound of |x| [rad].
+    `tiny`, sin and tan of x are x.
     """
 
     reduce_angle: Callable[[FunctionBuilder], tuple[Ref, Ref, Ref]]
     kernels: Callable[[FunctionBuilder, Ref, Ref], tuple[Ref, Ref]]
     tiny: Value
-    bound_text: str
 
 
 @dataclass(frozen=True)
@@ -189,16 +190,31 @@ def reduce_angle(body: FunctionBuilder) -> tuple[Ref, Ref, Ref]:
     parts of pi/2). `coarse` and `fine` are exact. The rounding error (coarse - head) - fine of head
     is exact, too: by Dekker's fast two-sum where |coarse| >= |fine|; else coarse - fine has at most
     52 bits. Near a multiple of pi/2 the reduced argument may be as small as 2^-60.5 (x =
-    45.553...); head + tail has it to 2^-110.
+    45.553...); head + tail has it to 2^-110. Angles above MAX_ANGLE are reduced by integers.
     """
     bounded, quarters, quadrant = count_quarter_turns(
         body, MAX_ANGLE, TWO_OVER_PI, ROUNDING_CONSTANT
     )
     coarse = body.let("coarse", subtract(bounded, multiply(quarters, HALF_PI_PARTS[0])))
     fine = body.let("fine", multiply(quarters, HALF_PI_PARTS[1]))
-    head = body.let("head", subtract(coarse, fine))
-    lost = body.let("lost", subtract(subtract(coarse, head), fine))
-    tail = body.let("tail", subtract(lost, multiply(quarters, HALF_PI_PARTS[2])))
+    near = body.let("near", subtract(coarse, fine))
+    lost = body.let("lost", subtract(subtract(coarse, near), fine))
+    rest = subtract(lost, multiply(quarters, HALF_PI_PARTS[2]))
+    return select_reduction(body, MAX_ANGLE, (quadrant, near, rest))
+
+
+def select_reduction(
+    body: FunctionBuilder, bound: float, near: tuple[Expr, Expr, Expr]
+) -> tuple[Ref, Ref, Ref]:
+    """Append and return (quadrant, head, tail): `near` up to `bound` [rad], else by integers.
+
+    A NaN gives `near`.
+    """
+    is_far = Compare(">", Call("abs", (X,)), real(bound))
+    quadrant, head, tail = (
+        body.let(name, Select(is_far, Call(f"reduced_{name}", (X,)), value))
+        for name, value in zip(("quadrant", "head", "tail"), near, strict=True)
+    )
     return quadrant, head, tail
 
 
@@ -208,7 +224,7 @@ def count_quarter_turns(
     """Append and return the clamped x, the nearest whole number of quarter turns, the quadrant.
 
     x is clamped to +-`bound` [rad]. The quadrant is 0, 1, 2 or 3. The locals are `bounded`,
-    `quarters`, `turns` and `quadrant`.
+    `quarters`, `turns` and `side`.
     """
     bounded = body.let("bounded", clamp(X, real(-bound), real(bound)))
     quarters = body.let(
@@ -217,8 +233,8 @@ def count_quarter_turns(
     # quarters / 4 - 3/8 is never near a tie: it rounds to the floor of quarters / 4.
     past = subtract(multiply(real(0.25), quarters), real(0.375))
     turns = body.let("turns", round_to_nearest(past, rounding_constant))
-    quadrant = body.let("quadrant", subtract(quarters, multiply(real(4.0), turns)))
-    return bounded, quarters, quadrant
+    side = body.let("side", subtract(quarters, multiply(real(4.0), turns)))
+    return bounded, quarters, side
 
 
 def sin_cos_kernels(
@@ -266,11 +282,11 @@ def select_by_quadrant(quadrant: Expr, *values: Expr) -> Expr:
     return result
 
 
-TRIG_FLOAT64 = TrigConstants(reduce_angle, sin_cos_kernels, TINY_ARGUMENT, "1e5")
+TRIG_FLOAT64 = TrigConstants(reduce_angle, sin_cos_kernels, TINY_ARGUMENT)
 
 
 def build_sin(constants: TrigConstants = TRIG_FLOAT64) -> Function:
-    """Return the Function `sin` of `x` [rad]; |x| is clamped to the bound of the number type.
+    """Return the Function `sin` of `x` [rad].
 
     The result is x itself for |x| below `tiny`, so that sin -0.0 is -0.0.
     """
@@ -279,18 +295,16 @@ def build_sin(constants: TrigConstants = TRIG_FLOAT64) -> Function:
     sin, cos = constants.kernels(body, head, tail)
     turned = select_by_quadrant(quadrant, sin, cos, Unary("-", sin), Unary("-", cos))
     body.let("y", Select(Compare("<", Call("abs", (X,)), constants.tiny), X, turned))
-    return body.build("sin", f"sine; |x| <= {constants.bound_text} rad, clamped; error < 0.85 ULP")
+    return body.build("sin", "sine; every x; error < 0.85 ULP")
 
 
 def build_cos(constants: TrigConstants = TRIG_FLOAT64) -> Function:
-    """Return the Function `cos` of `x` [rad]; |x| is clamped to the bound of the number type."""
+    """Return the Function `cos` of `x` [rad]."""
     body = FunctionBuilder()
     quadrant, head, tail = constants.reduce_angle(body)
     sin, cos = constants.kernels(body, head, tail)
     body.let("y", select_by_quadrant(quadrant, cos, Unary("-", sin), Unary("-", cos), sin))
-    return body.build(
-        "cos", f"cosine; |x| <= {constants.bound_text} rad, clamped; error < 0.85 ULP"
-    )
+    return body.build("cos", "cosine; every x; error < 0.85 ULP")
 
 
 TANH_FLOAT64 = TanhConstants(LAMBERT_NUMERATOR, LAMBERT_DENOMINATOR, TANH_SATURATION, TINY_ARGUMENT)

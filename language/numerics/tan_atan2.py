@@ -97,7 +97,7 @@ RISE, RUN = Ref("work.rise"), Ref("work.run")
 
 
 def build_tan(constants: TrigConstants = TRIG_FLOAT64) -> Function:
-    """Return the Function `tan` of `x` [rad]; |x| is clamped to the bound of the number type.
+    """Return the Function `tan` of `x` [rad].
 
     The result is sin / cos of the reduced argument, in odd quadrants -cos / sin. It is x itself for
     |x| below `tiny`.
@@ -108,9 +108,7 @@ def build_tan(constants: TrigConstants = TRIG_FLOAT64) -> Function:
     even, odd = divide(sin, cos), Unary("-", divide(cos, sin))
     turned = select_by_quadrant(quadrant, even, odd, even, odd)
     body.let("y", Select(Compare("<", Call("abs", (X,)), constants.tiny), X, turned))
-    return body.build(
-        "tan", f"tangent; |x| <= {constants.bound_text} rad, clamped; error < 2.4 ULP"
-    )
+    return body.build("tan", "tangent; every x; error < 2.4 ULP")
 
 
 def build_atan2(constants: Atan2Constants = ATAN2_FLOAT64) -> Function:

@@ -12,6 +12,7 @@ import mpmath
 from language.ir.ops import Assign, Binary, Call, Compare, Expr, Ref, Select, Unary, Value
 from language.ir.program import Function, unqualified_name
 from language.numerics.function_table import FUNCTIONS
+from language.numerics.payne_hanek import reduction_operations
 
 Real = Callable[..., float]
 
@@ -44,7 +45,7 @@ def text(expr: Expr) -> str:
 
 def compiled() -> dict[str, Real]:
     """Return the functions as Python functions."""
-    space: dict[str, Real] = {"abs": abs, "pow2": pow2}
+    space: dict[str, Real] = {"abs": abs, "pow2": pow2, **reduction_operations("float64")}
     for function in FUNCTIONS.values():
         lines = [f"def {function.name}({', '.join(function.parameters)}):"]
         for op in function.body:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
+import random
 import struct
+from pathlib import Path
 
 import pytest
 
 from engine.interpreter.interpreter import Interpreter
-from language.ir.number_type import NumberType, round_to_type
+from language.ir.number_type import NUMBER_TYPES, NumberType, round_to_type
 from lockstep.comparison import compare
 from lockstep.tick_log import TickLog
 from modewright.api.simulation import program
 from tests.lockstep.heater import column
-from tests.lockstep.program_strategies import Tick
+from tests.lockstep.program_strategies import Tick, record_ticks
 
 LOW, HIGH = -1.5, 2.25
 BOUNDS = {name: (LOW, HIGH) for name in "abcdef"} | {"m": (-HIGH, HIGH)}
@@ -185,3 +187,85 @@ def test_the_floor_of_a_real_is_held_in_the_range_of_its_target(tape: TickLog) -
     ):
         if mode == active and abs(a) > 1e-7:
             assert i == (7 if a > 0 else -7)
+
+
+CONVERSIONS = """\
+language: 1
+automaton: conversions
+period: 1 ms
+numbers: {numbers}
+inputs: {{u: {{unit: 1, range: [-1.0e30, 1.0e30]}}}}
+discrete:
+  any: {{type: int, initial: 0, range: [-2147483647, 2147483647]}}
+  up: {{type: int, initial: 0, range: [0, 2147483647]}}
+  few: {{type: int, initial: 0, range: [-9, 9]}}
+  kept: {{type: int, initial: 1, range: [-2147483647, 9], on_range: hold}}
+modes:
+  only: {{update: {{any: floor(u), up: floor(u), few: floor(u), kept: floor(u)}}}}
+outputs: [any, up, few, kept, faults]
+"""
+LARGEST = 2**31 - 1
+
+
+def convert(number: NumberType, folder: Path, reals: list[float]) -> TickLog:
+    (folder / "conversions.yaml").write_text(CONVERSIONS.format(numbers=number))
+    made = program(str(folder / "conversions.yaml"))
+    # The faults stay set: each value has an instance of its own.
+    return record_ticks(made, [{"input.u": u} for u in reals])
+
+
+@pytest.mark.parametrize("number", NUMBER_TYPES)
+@pytest.mark.parametrize(
+    ("u", "value", "is_too_large"),
+    [
+        (2147483520.0, 2147483520, False),
+        (-2147483520.0, -2147483520, False),
+        (2147483600.7, 2147483600, False),
+        (-2147483600.7, -2147483601, False),
+        (2147483648.0, LARGEST, True),
+        (-2147483648.0, -LARGEST, True),
+        (3.0e9, LARGEST, True),
+        (1.0e30, LARGEST, True),
+        (-1.0e30, -LARGEST, True),
+        (7.9, 7, False),
+    ],
+)
+def test_a_real_too_large_for_an_int_saturates_with_a_fault_bit(
+    number: NumberType, u: float, value: int, is_too_large: bool, tmp_path: Path
+) -> None:
+    if number == "float32" and not is_too_large and abs(u) > 2147483520.0:
+        value, is_too_large = (LARGEST if u > 0.0 else -LARGEST), True  # rounded to 2^31
+    tape = convert(number, tmp_path, [u])
+    row = dict(zip(tape.names, tape.unpack(tape.values[-1]), strict=True))
+    assert row["discrete.any"] == value
+    assert row["discrete.up"] == max(value, 0)
+    assert row["discrete.few"] == max(-9, min(value, 9))
+    assert row["discrete.kept"] == (1 if value > 9 or is_too_large else value)
+    faults = enumerate(tape.program.faults)
+    found = {name for bit, name in faults if int(row["memory.faults"]) >> bit & 1}
+    assert found == {
+        *({"range_any"} if is_too_large else ()),
+        *({"range_up"} if value < 0 or is_too_large else ()),
+        *({"range_few"} if abs(value) > 9 else ()),
+        *({"range_kept"} if value > 9 or is_too_large else ()),
+    }
+
+
+@pytest.mark.parametrize("number", NUMBER_TYPES)
+def test_conversions_have_the_same_bits_in_c(number: NumberType, tmp_path: Path) -> None:
+    draw = random.Random(f"conversions {number}")
+    limits = [2.0**31, 2.0**31 - 1.0, 2.0**31 - 0.5, 2.0**31 - 128.0, 2.0**24, 0.5, 9.5, 1.0e30]
+    near = [math.nextafter(x, y) for x in limits for y in (0.0, math.inf)]
+    reals = [*limits, *near, *(2.0 ** draw.uniform(-3.0, 40.0) for _ in range(300))]
+    tape = convert(number, tmp_path, [sign * x for x in reals for sign in (1.0, -1.0)])
+    verdict = compare(tape)
+    assert verdict.is_equal, str(verdict.first)
+
+
+def test_the_limit_of_the_type_is_no_fault_where_no_real_is_converted(tmp_path: Path) -> None:
+    text = CONVERSIONS.format(numbers="float64").replace("any: floor(u)", 'any: "max(any, up)"')
+    text = text.replace("any: {type: int, initial: 0", "any: {type: int, initial: -2147483647")
+    (tmp_path / "conversions.yaml").write_text(text)
+    made = program(str(tmp_path / "conversions.yaml"))
+    tape = record_ticks(made, [{"input.u": 3.0}, {"input.u": 4.0}])
+    assert tape.unpack(tape.values[0])[tape.names.index("memory.faults")] == 0

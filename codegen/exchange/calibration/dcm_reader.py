@@ -31,6 +31,8 @@ from language.text.diagnostic import Problems, Source, Span, suggest_name
 
 COMMENT_MARKS = ("*", "!", ".")
 """First characters of comment lines."""
+INLINE_COMMENT_MARKS = ("*", "!")
+"""First characters of a comment behind values; a point may begin a number."""
 WORD_PATTERN = re.compile(r'"[^"]*"|"?[^\s"]+|"')
 """A word of a line: a text in quotes, or characters without a blank."""
 SECTIONS = ("FUNKTIONEN", "VARIANTENKODIERUNG")
@@ -188,8 +190,10 @@ def _unquote(cell: Cell) -> Cell:
 def _read_line(block: DcmBlock, words: Words, context: _ReadContext) -> None:
     """Add a line to a block; report a keyword without values, and warn of an unknown keyword."""
     word, *rest = words
-    cells = [_unquote(cell) for cell in rest]
     target = _target_list(block, word.text)
+    if target is not None or word.text.startswith("EINHEIT_"):
+        rest = _without_comment(rest, context.problems)
+    cells = [_unquote(cell) for cell in rest]
     if target is not None:
         if not cells:
             label = f"behind `{word.text}` there is no value"
@@ -201,6 +205,19 @@ def _read_line(block: DcmBlock, words: Words, context: _ReadContext) -> None:
         block.about.append(cells[0].text)
     elif word.text not in IGNORED_WORDS and not word.text.startswith("EINHEIT_"):
         _warn_unknown_word(word, block, context)
+
+
+def _without_comment(cells: Words, problems: Problems) -> Words:
+    """Return the values of a line up to a comment behind them; warn of such a comment.
+
+    The format has comments in lines of their own only, but files are annotated by hand.
+    """
+    for position, cell in enumerate(cells):
+        if cell.text.startswith(INLINE_COMMENT_MARKS):
+            label = "the rest of the line is passed over as a comment"
+            problems.warning("form", cell.span, label, "a comment of DCM has a line of its own")
+            return cells[:position]
+    return cells
 
 
 def _target_list(block: DcmBlock, word: str) -> list[Cell] | None:

@@ -77,7 +77,8 @@ def import_values(
     Values of parameters are YAML nodes in the unit of the parameter. Names that the filter rejected
     have a remark `passed over`, constants that are not in the file a remark `missing`. Invalid
     values, names that are not on the page, and a file in which the filter rejected all names are
-    errors. Raises SpecError at the end if any was reported to `problems`.
+    errors. A value with an unknown unit is left out with a remark `skipped`; if no other value is
+    left, it is an error. Raises SpecError at the end if any was reported to `problems`.
     """
     constants = {page_name(program, constant): constant for constant in page_constants(program)}
     context = ImportContext(automaton, program.number_type, problems)
@@ -99,6 +100,10 @@ def import_values(
             node = _read_value(characteristics[name], constant, context)
             if node is not None:
                 values[unqualified_name(constant.name)] = node
+    if not values:
+        for remark in context.remarks:
+            if remark.kind == "skipped" and remark.span:
+                problems.error("unit", remark.span, f"`{remark.name}` {remark.text}")
     problems.raise_if_errors()
     return ImportedValues(values, solved, tuple(context.remarks))
 
@@ -244,11 +249,12 @@ def _read_integer(cell: Cell, parameter: Parameter, problems: Problems) -> int |
 def _read_word(cell: Cell, parameter: Parameter, problems: Problems) -> int | None:
     """Return the index of a truth or enumeration value, given as a word or as the index itself.
 
-    Returns None with a problem reported for any other text.
+    A truth value may have capital letters. Returns None with a problem reported for any other text.
     """
     words = ("false", "true") if parameter.type == "bool" else parameter.values
-    if cell.text in words:
-        return words.index(cell.text)
+    word = cell.text.lower() if parameter.type == "bool" else cell.text
+    if word in words:
+        return words.index(word)
     if ENUM_INDEX.fullmatch(cell.text) and Fraction(cell.text) < len(words):
         return int(Fraction(cell.text))
     label = f"`{cell.text}` is not one of {', '.join(words)}"

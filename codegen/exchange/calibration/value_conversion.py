@@ -6,15 +6,19 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal
 
-from codegen.exchange.calibration.cell_parser import parse_cell_number, parse_unit_cell
+from codegen.exchange.calibration.cell_parser import (
+    is_blank_unit,
+    parse_cell_number,
+    parse_unit_cell,
+)
 from codegen.exchange.calibration.characteristic import Cell, FileCharacteristic
-from language.expressions.units import Unit
+from language.expressions.units import Unit, UnitError, unit_hint
 from language.ir.number_type import NumberType, round_to_type, shortest_decimal
 from language.model.automaton import Automaton
 from language.model.declaration import Parameter
 from language.text.diagnostic import Problems, Span
 
-RemarkKind = Literal["rounded", "converted", "no unit", "missing", "passed over"]
+RemarkKind = Literal["rounded", "converted", "no unit", "missing", "passed over", "skipped"]
 """The kinds of remarks."""
 
 
@@ -43,6 +47,10 @@ class ImportContext:
         Its name is the text of the cell.
         """
         self.remarks.append(Remark(kind, cell.text, text, at or cell.span))
+
+    def is_skipped(self, name: str) -> bool:
+        """Tell whether a name of the file has a remark `skipped`."""
+        return any(each.kind == "skipped" and each.name == name for each in self.remarks)
 
 
 def convert_real(
@@ -90,14 +98,21 @@ def resolve_unit(
 ) -> Unit | None:
     """Return the unit of values: that of `cell`, else the SI unit of `declared_unit`.
 
-    A missing unit (None or blank) adds a remark `no unit` on the characteristic, unless the values
-    are dimensionless. Returns None with a problem reported if the unit is unknown or incompatible.
+    If the file declares no unit, a remark `no unit` is added on the characteristic, unless the
+    values are dimensionless. Returns None with a remark `skipped` if the unit is unknown, and with
+    a problem reported if it is incompatible.
     """
-    unit = parse_unit_cell(cell, declared_unit, context.problems)
-    if unit and (cell is None or not cell.text.strip()) and not declared_unit.dimension.is_number:
-        context.add_remark(
-            "no unit", characteristic.name, f"has no unit beside it: taken in {unit.text}"
-        )
+    name = characteristic.name
+    try:
+        unit = parse_unit_cell(cell, declared_unit, context.problems)
+    except UnitError as error:
+        assert cell is not None
+        hint = unit_hint(cell.text.strip())
+        text = f"is not taken: {error}{f', {hint}' if hint else ''}"
+        context.add_remark("skipped", name, text, cell.span)
+        return None
+    if unit and is_blank_unit(cell) and not declared_unit.dimension.is_number:
+        context.add_remark("no unit", name, f"has no unit beside it: taken in {unit.text}")
     return unit
 
 

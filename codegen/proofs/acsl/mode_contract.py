@@ -73,7 +73,7 @@ def check_contracts(automaton: Automaton, program: Program, folder: Path) -> Too
     """
     made = run_c_passes(program, by_magnitude=False)
     tool = f"Frama-C {tool_version('frama-c', folder)} WP"
-    modes = [mode for mode in program.modes if f"jump_{mode.name}" in made.blocks]
+    modes = modes_with_contract(program, made)
     files = emit_c_files(program, by_magnitude=False)
     charting = None
     if automaton.is_sampled:
@@ -85,13 +85,21 @@ def check_contracts(automaton: Automaton, program: Program, folder: Path) -> Too
         what += f", of {', '.join(chart.unsaid)} lemmas alone" if chart.unsaid else ""
         return _told(tool, prove_chart_contracts(program.name, names, folder), what)
     if program.period is None or program.regions or not modes:
-        about = "one region of a sampled automaton, and a chart, have contracts"
+        about = "one region of a sampled automaton with transitions, and a chart, have contracts"
         return ToolVerdict("contract", tool, about, is_asked=False)
     asking = write_contracts(program, files, folder, wholes_of(automaton))
     run = sum(len(names) for names, options in asking if options == OF_CALLED)
     also = f", {run} functions that they run" if run else ""
     found = prove_contracts(folder, f"{program.name}.c", asking)
     return _told(tool, found, f"{len(modes)} modes{also}")
+
+
+def modes_with_contract(program: Program, made: Program) -> list[ModeInfo]:
+    """Return the modes whose function does something; `made` is the Program that C is printed of.
+
+    The function of a mode without transitions has no operations, and no argument in C.
+    """
+    return [mode for mode in program.modes if made.blocks.get(f"jump_{mode.name}")]
 
 
 def wholes_of(automaton: Automaton) -> Wholes:
@@ -112,7 +120,7 @@ def write_contracts(
     functions that they run. `wholes` gives the ranges of whole numbers that are preserved.
     """
     made, file = run_c_passes(program, by_magnitude=False), f"{program.name}.c"
-    modes = [mode for mode in program.modes if f"jump_{mode.name}" in made.blocks]
+    modes = modes_with_contract(program, made)
     called = called_by(made, [f"jump_{mode.name}" for mode in modes])
     text, functions = add_effect_contracts(made, files[file], called), []
     for mode in modes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -148,3 +149,54 @@ def test_tunable_tables_compile_without_warnings(number: NumberType, tmp_path: P
     assert done.returncode == 0, done.stderr
     spec.write_text(SPEC.replace("float64", number).replace("tunable: true", "range: [-9, 9]"))
     assert header not in emit_c_files(program(str(spec)))
+
+
+ALL_TABLES = """\
+language: 1
+automaton: tables
+period: 10 ms
+numbers: {numbers}
+parameters:
+  one: {{table: {{over: u, unit: N*m, points: {{0: 5, 1: 6, 4: 7}}}}, tunable: true}}
+  two:
+    table: {{over: [u, v], unit: 1, points: {{0: {{0: 1, 1: 2}}, 1: {{0: 3, 1: 4}}}}}}
+    tunable: true
+  fixed: {{table: {{over: u, unit: 1, points: {{0: 5, 1: 6}}}}}}
+  gain: {{value: 2, range: [0, 5], tunable: true}}
+inputs: {{u: {{unit: 1, range: [0, 9]}}, v: {{unit: 1, range: [0, 9]}}}}
+states: {{x: {{unit: 1, initial: "lookup(two, 0.5, 0.5)", range: [-99, 99]}}}}
+equations: {{a: "lookup(one, u * gain)", b: "lookup(two, u, v)", c: "lookup(fixed, u)"}}
+initial: low
+modes:
+  low: {{update: {{x: x + b}}, transitions: {{high: {{when: "lookup(two, v, u) > 2"}}}}}}
+  high: {{transitions: {{low: {{when: x > 9, reset: {{x: "lookup(fixed, v)"}}}}}}}}
+outputs: [a, b, c, x, mode]
+"""
+
+
+@pytest.mark.parametrize("number", NUMBER_TYPES)
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("gcc", "-std=c99", "-pedantic-errors", *WARNINGS, "-Werror"),
+        ("clang-19", "-std=c99", "-pedantic-errors", *WARNINGS, "-Werror"),
+        ("g++", "-x", "c++", "-Wall"),
+    ],
+    ids=lambda command: command[0],
+)
+def test_tables_of_every_kind_are_valid_for_every_compiler(
+    command: tuple[str, ...], number: NumberType, tmp_path: Path
+) -> None:
+    """A C++ compiler refuses a lost `volatile` and a constant without a value."""
+    if shutil.which(command[0]) is None:
+        pytest.skip(f"{command[0]} is not installed: make system-packages")
+    spec = tmp_path / "tables.yaml"
+    spec.write_text(ALL_TABLES.format(numbers=number))
+    files = emit_c_files(program(str(spec)))
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    for name in (name for name in files if name.endswith(".c")):
+        line = [*command, "-c", name, "-o", "made.o"]
+        done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        assert "warning" not in done.stderr

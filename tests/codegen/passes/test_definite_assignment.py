@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import re
+import subprocess
 from fractions import Fraction
+from pathlib import Path
 
 import pytest
 
 from codegen.emit.c_module import emit_c_files
 from codegen.passes.definite_assignment import find_unassigned_reads
+from codegen.toolchain.compiler import WARNINGS, find_compiler, flags_at_level
+from language.ir.number_type import NUMBER_TYPES, NumberType
 from language.ir.ops import (
     Assign,
     Block,
@@ -96,3 +100,52 @@ def test_a_loop_ends_where_its_condition_does() -> None:
     loop = "for (int32_t piece = 0; piece < 101; piece++) {"
     assert re.search(rf"{re.escape(loop)}\s+if \(!\(work->left > 0.0\)\) {{\s+break;", text)
     assert "for (int32_t halving = 0; halving < 44; halving++) {" in text
+
+
+EVENTS = """\
+language: 1
+automaton: events
+step: 10 ms
+numbers: {numbers}
+states: {{x: {{unit: m, initial: 0 m}}}}
+flow: {{x: der(x) = 1 m/s}}
+initial: low
+modes:
+  low: {{transitions: {{high: {{when: x > 0.5 m{low}}}}}}}
+  high: {{transitions: {{last: {{when: x > 1 m, reset: {{x: 0 m}}}}}}}}
+  last: {{{last}}}
+outputs: [x, mode]
+"""
+LAST_MODES = {"without a guard": "", "waits": "transitions: {low: {when: after(0.1 s)}}"}
+
+
+@pytest.mark.parametrize("number", NUMBER_TYPES)
+@pytest.mark.parametrize("low", ["", ", wait: 30 ms"])
+@pytest.mark.parametrize("last", LAST_MODES)
+def test_no_compiler_warns_of_work_values_on_the_stack(
+    last: str, low: str, number: NumberType, tmp_path: Path
+) -> None:
+    """A compiler assumes that a mode can be none of the cases of a switch."""
+    text = EVENTS.format(numbers=number, low=low, last=LAST_MODES[last])
+    (tmp_path / "events.yaml").write_text(text)
+    files = emit_c_files(shipped(str(tmp_path / "events.yaml")))
+    assert "Work scratch;" in files["events.c"], "this is not about work values on the stack"
+    for name, content in files.items():
+        (tmp_path / name).write_text(content)
+    for level in ("O1", "O2", "O3"):
+        command = [*find_compiler(), *flags_at_level(level), *WARNINGS, "-Werror"]
+        done = subprocess.run(
+            [*command, "-c", "events.c", "-o", "events.o"],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+
+
+def test_a_switch_over_all_modes_may_still_take_none() -> None:
+    events = shipped("driveline")
+    shared = frozenset({"work.elapsed", "work.crossed"})
+    assert not find_unassigned_reads(events, "step", shared)
+    assert find_unassigned_reads(events, "step", shared, are_modes_known=False)

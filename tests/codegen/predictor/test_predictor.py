@@ -7,6 +7,9 @@ import pytest
 
 from codegen.emit.c_module import restrict_to_step
 from codegen.predictor.predictor import Predictor, build_predictor, columns_of, slice_to_outputs
+from codegen.predictor.predictor_arrays import StackedRecordings
+from codegen.predictor.simd_predictor import simd_recordings_context
+from codegen.toolchain.compiler import has_gcc_vectors
 from engine.interpreter.interpreter import Interpreter
 from language.ir.program import Program
 from tests.language.spec_builders import program
@@ -113,3 +116,34 @@ def test_a_table_that_one_mode_reads_is_no_vector() -> None:
             linear_inputs=HELD,
         )
     assert run.states[-1, 0] == pytest.approx(0.5 + 0.5 * np.exp(-0.08), rel=1e-6)
+
+
+@pytest.mark.skipif(not has_gcc_vectors(), reason="no vectors on this machine")
+def test_large_angles_have_the_same_bits_in_lanes() -> None:
+    """Lanes with small and with large angles side by side, and each recording alone."""
+    text = TEXT.format(number="float64", only=FIXED)
+    made = program(text.replace("tanh(x * 9)", "sin(x * 90000 rad) * cos(x * 1.0e9 rad)"))
+    columns = columns_of(made, ("x",))
+    context = simd_recordings_context(slice_to_outputs(made), ("x",), ("x",))
+    assert context is not None
+    assert "each_reduced_head" in str(context["functions"]["sin"])
+    draw = np.random.default_rng(3)
+    starts = np.array([0, 40, 90, 100, 170, 200], dtype=np.int64)
+    inputs = draw.uniform(-9.0, 9.0, (200, 1))
+    page = np.array(list(columns.page.values()))
+    gains = np.zeros((5, 1, 1)), np.zeros((2, 1, 1))
+    recordings = StackedRecordings(
+        inputs, np.zeros((200, 1)), starts, np.full(5, 9), np.zeros((5, 1), dtype=np.int64)
+    )
+    with build_predictor(made, columns) as library:
+        predictor = Predictor(columns, library)
+        whole = predictor.predict_recordings(
+            np.tile(page, (5, 1)), recordings, *gains, 1, np.full(1, np.inf)
+        ).split()
+        for r, one in enumerate(whole):
+            low, high = starts[r : r + 2]
+            alone = predictor.predict(
+                page, inputs[low:high], np.zeros((high - low, 1)), *gains, 1, linear_inputs=HELD
+            )
+            assert one.states.tolist() == alone.states.tolist()
+    assert np.abs(np.concatenate([one.states for one in whole])).max() * 90000.0 > 1e5

@@ -107,3 +107,26 @@ def test_modes_whose_transitions_run_nothing_stay_whole(name: str, tmp_path: Pat
     asking = write_contracts(made, emit_c_files(made, by_magnitude=False), tmp_path)
     assert [options[0] for _, options in asking] == ["-wp-rte", "-wp-rte"]
     assert all(names == [f"jump_{mode.name}" for mode in made.modes] for names, _ in asking)
+
+
+TERMINAL = """\
+language: 1
+automaton: terminal
+period: 10 ms
+numbers: float64
+inputs: {u: {unit: 1, range: [0, 9]}}
+initial: a
+modes:
+  a: {transitions: {b: {when: u > 3, wait: 50 ms}}}
+  b: {}
+outputs: [mode]
+"""
+
+
+def test_a_mode_without_transitions_has_no_contract(tmp_path: Path) -> None:
+    """Its function has no argument that a contract could name."""
+    (tmp_path / "terminal.yaml").write_text(TERMINAL)
+    made = program(str(tmp_path / "terminal.yaml"))
+    asking = write_contracts(made, emit_c_files(made, by_magnitude=False), tmp_path)
+    assert {name for names, _ in asking for name in names} == {"jump_a"}
+    assert (tmp_path / "terminal.c").read_text().count("/*@") == 1

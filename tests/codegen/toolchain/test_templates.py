@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -50,12 +51,42 @@ def test_a_template_is_compiled_once(folder: Path, compiled: list[str]) -> None:
     assert (folder / TEMPLATE_CACHE).stat().st_mode & 0o777 == 0o700
 
 
-def test_one_that_is_damaged_is_compiled_anew(folder: Path, compiled: list[str]) -> None:
+def test_one_that_is_cut_is_compiled_anew(folder: Path, compiled: list[str]) -> None:
     first = rendered()
     for path in (folder / TEMPLATE_CACHE).iterdir():
         path.write_bytes(path.read_bytes()[:40])
     assert rendered() == first
     assert len(compiled) == 2
+
+
+def test_any_changed_byte_is_found_and_the_file_is_stored_anew(
+    folder: Path, compiled: list[str]
+) -> None:
+    """Text in the bytecode is text of the C: a changed letter would be another C."""
+    first = rendered()
+    (path,) = (folder / TEMPLATE_CACHE).iterdir()
+    stored = path.read_bytes()
+    for position in range(0, len(stored), max(1, len(stored) // 60)):
+        changed = bytes([stored[position] ^ 1])
+        path.write_bytes(stored[:position] + changed + stored[position + 1 :])
+        compiled.clear()
+        assert rendered() == first
+        assert compiled == [TEMPLATE]
+        assert path.read_bytes() == stored
+
+
+def test_a_pipe_or_a_link_in_place_of_a_template_is_not_read(
+    folder: Path, tmp_path: Path, compiled: list[str]
+) -> None:
+    first = rendered()
+    (path,) = (folder / TEMPLATE_CACHE).iterdir()
+    path.rename(tmp_path / "elsewhere")
+    path.symlink_to(tmp_path / "elsewhere")
+    assert rendered() == first
+    path.unlink()
+    os.mkfifo(path)
+    assert rendered() == first
+    assert compiled == [TEMPLATE] * 3
 
 
 def test_without_a_folder_of_the_users_own_nothing_is_kept(

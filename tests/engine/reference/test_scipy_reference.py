@@ -13,8 +13,10 @@ import numpy as np
 import pytest
 
 from engine.execution.event_loop import SimulationStopped
+from engine.interpreter.interpreter import Interpreter
 from engine.reference.scipy_reference import (
     reference_numbers,
+    reference_stepper,
     simulate_reference,
     with_reference_numbers,
 )
@@ -24,6 +26,7 @@ from engine.results.trajectory import Trajectory
 from engine.simulation import instance_programs as starting
 from engine.simulation.instance_programs import programs_of
 from engine.simulation.simulate import simulate
+from language.ir.number_type import NUMBER_TYPES, NumberType
 from language.ir.program import Program
 from language.loading.load import program_of
 from language.loading.scenario_reader import read_scenario
@@ -31,6 +34,7 @@ from language.loading.system_reader import read_system
 from language.model.automaton import Automaton
 from language.model.system import Scenario, System
 from language.overlays.expand_document import Project, read_document
+from modewright.api.simulation import program
 from tests.engine.finite_escape import RUNAWAY
 
 Alone = Callable[[str, str], tuple[System, Scenario]]
@@ -295,3 +299,31 @@ def test_a_number_taken_as_zero_that_is_not_is_refused(tip_out: tuple[System, Sc
     solved = {name: value for name, value in info.solved.items() if name != missing}
     with pytest.raises(ValueError, match=f"{missing} is 0 in the Program, 0\\.22"):
         reference_numbers(dataclasses.replace(info, solved=solved))
+
+
+TURN = """language: 1
+automaton: turn
+period: 1 ms
+numbers: {numbers}
+inputs: {{u: {{unit: 1, range: [-1.0e30, 1.0e30]}}}}
+equations: {{s: sin(u * 1 rad), c: cos(u * 1 rad), t: tan(u * 1 rad), h: tanh(u)}}
+outputs: [s, c, t, h]
+"""
+
+
+@pytest.mark.parametrize("number", NUMBER_TYPES)
+def test_elementary_functions_are_those_of_numpy(number: NumberType, tmp_path: Path) -> None:
+    """The engine agrees within its stated errors at any angle."""
+    (tmp_path / "turn.yaml").write_text(TURN.format(numbers=number))
+    made = program(str(tmp_path / "turn.yaml"))
+    reference, engine = reference_stepper(made), Interpreter(made)
+    real = np.float64 if number == "float64" else np.float32
+    for u in (0.3, -999.0, 1002.0, 40000.0, -3.0e6, 1.0e22, -1.0e30):
+        for stepper in (reference, engine):
+            stepper.set("input.u", u)
+            stepper.run("step")
+        for name, function in (("s", np.sin), ("c", np.cos), ("t", np.tan), ("h", np.tanh)):
+            found = reference.get(f"equation.{name}")
+            assert found == float(function(real(u)))
+            error = 4.0 * abs(found) * float(np.finfo(real).eps)
+            assert abs(engine.get(f"equation.{name}") - found) <= error

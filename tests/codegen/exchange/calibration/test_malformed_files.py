@@ -66,7 +66,10 @@ CASES: dict[str, tuple[bytes, str]] = {
         block("  WERT 1", name="kinds_float64.gian"),
         "has no tunable parameter or solved number `kinds_float64.gian` [MW115]",
     ),
-    "unit.dcm": (block('EINHEIT_W "furlong"', "WERT 1"), "unit.dcm:4:11: error: `furlong` is not"),
+    "unit.dcm": (
+        block('EINHEIT_W "furlong"', "WERT 1"),
+        "unit.dcm:4:11: error: `kinds_float64.gain` is not taken: `furlong` is not a unit [MW304]",
+    ),
     "other.dcm": (block('EINHEIT_W "N*m"', "WERT 1"), "`N*m` does not fit the unit `1` [MW305]"),
     "two.dcm": (block("WERT 1 2"), "two.dcm:4:8: error: `kinds_float64.gain` has 2 values, its"),
     "none.dcm": (block("FUNKTION a"), "`kinds_float64.gain` has 0 values, its head says 1"),
