@@ -20,6 +20,7 @@ from language.lowering.delay_buffers import (
     expression_type,
     memory_calls_by_key,
 )
+from language.lowering.event_tolerance import is_instantaneous
 from language.lowering.program_parameters import parameter_kinds
 from language.model.automaton import Automaton, Transition
 from language.model.declaration import Formula
@@ -95,12 +96,17 @@ def _check_time(
 def _check_period(automaton: Automaton, tree: FunctionCall, problems: Problems) -> None:
     """Report a time of `every` that is zero or not a whole number of periods.
 
-    Rounding the time to ticks would let it drift.
+    Rounding the time to ticks would let it drift. In a continuous automaton a time within the
+    tolerance of rule 10 is reported: the run would stop as Zeno behaviour (rule 12).
     """
     time = tree.arguments[0]
     value = evaluate_exactly(Formula(time, ""), automaton)
     if value == 0:
         problems.error("wait", time.span, "the time of `every` is above zero")
+    elif value > 0 and not automaton.period and is_instantaneous(automaton, value):
+        label = f"`every` of {float(value):g} s has more than 100 instants in a major step"
+        hint = f"a longer time, or a shorter `step` than {float(automaton.step):g} s"
+        problems.error("wait", time.span, label, hint)
     elif automaton.period and value > 0 and (value / automaton.period).denominator != 1:
         label = f"`every` of {float(value / automaton.period):g} ticks would drift"
         hint = f"a whole number of periods of {float(automaton.period):g} s"
