@@ -13,6 +13,7 @@ from language.expressions.syntax_tree import (
     names,
     walk,
 )
+from language.ir.program import MAX_TIMER_TICKS
 from language.lowering.constants import evaluate_exactly
 from language.lowering.continuous_delay import tunable_delay_of
 from language.lowering.delay_buffers import (
@@ -27,16 +28,13 @@ from language.model.declaration import Formula
 from language.model.region_queries import equation_names
 from language.text.diagnostic import Problems
 
-MAX_AFTER_TICKS = 65535
-"""Largest `after` in ticks: its counter is a uint16."""
-
 
 def check_memory(automaton: Automaton, problems: Problems) -> None:
     """Report invalid uses of functions with memory.
 
     These are times that are not constant or negative, `delay` of more than MAX_DELAY ticks or major
     steps or (continuous) of less than one major step, `after` or `every` of more than
-    MAX_AFTER_TICKS ticks, an `every` of 0 or of no whole number of periods, delayed names without
+    MAX_TIMER_TICKS ticks, an `every` of 0 or of no whole number of periods, delayed names without
     an equation in some mode, a delay of a value that is no real or `changed` of a real in a
     continuous automaton, and edges or `every` on transitions with a positive wait.
     """
@@ -48,7 +46,7 @@ def check_memory(automaton: Automaton, problems: Problems) -> None:
         if tree.function == "delay":
             _check_time(automaton, tree, tree.arguments[1], MAX_DELAY, problems)
     for tree in memory_calls_by_key(automaton, TIME_FUNCTIONS).values():
-        _check_time(automaton, tree, tree.arguments[0], MAX_AFTER_TICKS, problems)
+        _check_time(automaton, tree, tree.arguments[0], MAX_TIMER_TICKS, problems)
     for tree in memory_calls_by_key(automaton, ("every",)).values():
         with problems.collect_errors():
             _check_period(automaton, tree, problems)

@@ -20,7 +20,12 @@ from language.lowering.constants import evaluate_exactly
 from language.lowering.event_tolerance import is_instantaneous
 from language.lowering.guard_variable_names import guard_slot
 from language.lowering.tick_history import rollbacks_of
-from language.lowering.wait_ticks import MAX_WAIT_TICKS, seconds_to_ticks, tunable_wait
+from language.lowering.wait_ticks import (
+    MAX_WAIT_TICKS,
+    seconds_to_ticks,
+    tunable_wait,
+    wait_range_in_ticks,
+)
 from language.model.automaton import Automaton, Mode, Transition
 from language.text.diagnostic import Problems
 
@@ -66,9 +71,15 @@ def transition_infos(automaton: Automaton, problems: Problems) -> tuple[Transiti
                     rewind_ticks=back.get(transition.key, 0),
                     chart_endpoints=_chart_endpoints(automaton, transition),
                     tunable_wait=f"calibration.{tunable}" if tunable else None,
+                    max_ticks=_max_ticks(automaton, tunable) if tunable else 0,
                 )
             )
     return tuple(found)
+
+
+def _max_ticks(automaton: Automaton, tunable: str) -> int:
+    """Return the end of the range of a tunable wait in ticks."""
+    return int(wait_range_in_ticks(automaton, automaton.parameters[tunable])[1])
 
 
 def wait_ticks(info: TransitionInfo) -> Expr:
