@@ -51,7 +51,8 @@ def emit_expression(expr: Expr, c_names: CNameMap) -> str:
     Every compound operand is in parentheses, also a unary minus or negative literal; except a left
     operand that C evaluates first anyway (LEFT_ASSOCIATIVE). A comparison of a variable with an
     integer literal uses `integer_constant`; if exactly one of two compared variables is unsigned,
-    it is cast to int32_t. A lookup in a volatile table calls the function of the header ha_page.
+    it is cast to int32_t. An integer literal beside an unsigned operand has the suffix U. A lookup
+    in a volatile table calls the function of the header ha_page.
     """
     match expr:
         case Value(value):
@@ -77,8 +78,11 @@ def emit_expression(expr: Expr, c_names: CNameMap) -> str:
                 return f"{first} {operator} {second}"
             return f"{_emit_operand(left, c_names)} {operator} {_emit_operand(right, c_names)}"
         case Select(condition, then, other):
-            parts = [_emit_operand(part, c_names) for part in (condition, then, other)]
-            return f"{parts[0]} ? {parts[1]} : {parts[2]}"
+            first, second = (
+                _emit_beside(part, beside, c_names)
+                for part, beside in ((then, other), (other, then))
+            )
+            return f"{_emit_operand(condition, c_names)} ? {first} : {second}"
         case Call(function, arguments):
             texts = [emit_expression(argument, c_names) for argument in arguments]
             if reads_table(expr, c_names.is_volatile):
@@ -134,7 +138,24 @@ def _emit_binary(binary: Binary, operator: str, left: Expr, right: Expr, c_names
         binary.operator, ""
     )
     first = emit_expression(left, c_names) if chained else _emit_operand(left, c_names)
-    return f"{first} {operator} {_emit_operand(right, c_names)}"
+    return f"{first} {operator} {_emit_beside(right, left, c_names)}"
+
+
+def _emit_beside(expr: Expr, beside: Expr, c_names: CNameMap) -> str:
+    """Return the C text of an operand; an integer literal beside an unsigned one has a U."""
+    is_integer = isinstance(expr, Value) and type(expr.value) is int
+    suffix = "U" if is_integer and _is_unsigned(beside, c_names) else ""
+    return _emit_operand(expr, c_names) + suffix
+
+
+def _is_unsigned(expr: Expr, c_names: CNameMap) -> bool:
+    """Tell whether an expression is an unsigned variable, or a sum that begins with one."""
+    match expr:
+        case Ref(name):
+            return c_names.is_unsigned(name)
+        case Binary("+", left, _):
+            return _is_unsigned(left, c_names)
+    return False
 
 
 def _emit_call(function: str, arguments: list[str], number: NumberType) -> str:

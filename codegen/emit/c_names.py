@@ -10,6 +10,7 @@ from functools import cached_property
 from language.ir.number_type import NumberType
 from language.ir.program import (
     MODE_VARIABLE,
+    SHORT_TIMER_TICKS,
     TICK_UNIT,
     Constant,
     Program,
@@ -142,9 +143,9 @@ def c_member(name: str) -> str:
 def c_type(variable: Variable | Constant, number: NumberType) -> str:
     """Return the C type of a variable or constant (rule C10).
 
-    Reals have the type of `number`, truth values bool, enumerations uint8_t, timers, values in
-    ticks and transition numbers uint16_t, the fault word uint32_t, modes int16_t, other whole
-    numbers int32_t.
+    Reals have the type of `number`, truth values bool, enumerations uint8_t, timers and values in
+    ticks uint16_t or uint32_t, transition numbers uint16_t, the fault word uint32_t, modes int16_t,
+    other whole numbers int32_t.
     """
     if variable.type == "real":
         return C_REAL_TYPE[number]
@@ -153,12 +154,23 @@ def c_type(variable: Variable | Constant, number: NumberType) -> str:
     if variable.values:
         return "uint8_t"
     if variable.name.startswith("timer.") or variable.unit == TICK_UNIT:
-        return "uint16_t"
+        return "uint16_t" if _largest_ticks(variable) <= SHORT_TIMER_TICKS else "uint32_t"
     if variable.name == "memory.faults":
         return "uint32_t"
     if variable.name.startswith(TRANSITION_PREFIXES):
         return "uint16_t"
     return "int16_t" if variable.name.startswith(MODE_PREFIXES) else "int32_t"
+
+
+def _largest_ticks(variable: Variable | Constant) -> int:
+    """Return the largest value of a counter; of a tunable wait the value of its counter after it.
+
+    A wait and its counter so have the same type.
+    """
+    if isinstance(variable, Variable):
+        return variable.largest
+    assert variable.range
+    return int(variable.range[1]) + 1
 
 
 def mode_constant(program: Program, number: int, region: str = CHART) -> str:

@@ -31,6 +31,8 @@ MAX_TICKS = 2**52
 """Largest number of common ticks in a horizon; a double counts them exactly."""
 MAX_SCHEDULE_BITS = 32
 """Number of bits in the word that says what happens at an instant."""
+LARGEST_FACTOR = 2**996
+"""Largest slope of an input [1/s]: Dekker's product multiplies it by 2^27 + 1 in a double."""
 NO_ROW = -1
 """Index that stands for no row or no step."""
 
@@ -110,6 +112,9 @@ def planning_obstacle(
             return f"sensor `{name}` has no `sample`"
         if sensor.lag and sensor.source.partition(".")[0] not in flows:
             return f"sensor `{name}` has a lag on a sampled output"
+    for name, stimulus in scenario.inputs.items():
+        if any(abs(piece.slope) > LARGEST_FACTOR for piece in stimulus.pieces):
+            return f"input `{name}` is too steep for a product of two doubles"
     if len(assembly_of(system, scenario, programs).instant_actions) > MAX_SCHEDULE_BITS:
         return f"more than {MAX_SCHEDULE_BITS} things tick, sample or arrive"
     if _tick(Schedule(system, scenario, dict(programs)), programs) is None:

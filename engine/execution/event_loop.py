@@ -19,6 +19,12 @@ from engine.results.sampled_run import Event
 from language.ir.program import Program, TransitionInfo, unqualified_name
 from language.programs.major_step import MAX_EVENTS_PER_STEP
 
+SHORTEST_FLOW = Fraction(1, 2**52)
+"""Longest part of a major step over which nothing flows.
+
+The times of a scenario are exact and may be this close. States do not change measurably in such a
+time, and the square of a shorter one may round to zero.
+"""
 FlowSegment = tuple[Fraction, Fraction, Sequence[float], float]
 """Start and planned end [s] of a flow, and the states and age of the delay records at its start."""
 
@@ -158,8 +164,10 @@ class ContinuousRun:
             now, is_begun = cruise.advance(now, stop)
             if is_begun:
                 self.time = now * step
-                return PartialStep((self.time, self.time + step, states, 0.0) if states else None)
-            if states:
+                return PartialStep(
+                    None if states is None else (self.time, self.time + step, states, 0.0)
+                )
+            if states is not None:
                 self.time = now * step
                 self._look_inside((now - 1) * step, self.time, states, 0.0)
                 look = self._next_look(cruise, last)
@@ -196,8 +204,13 @@ class ContinuousRun:
             raise SimulationStopped(f"{self._here()}: {text}: {_fired(self._in_step)}")
 
     def _segment(self, end: Fraction) -> bool:
-        """Flow to the end of the step or the next event in it; tell whether there is one."""
+        """Flow to the end of the step or the next event in it; tell whether there is one.
+
+        Nothing flows over a rest of at most SHORTEST_FLOW, in which there is no event.
+        """
         stepper = self.stepper
+        if end - self.time <= SHORTEST_FLOW * self.program.major_step:
+            return self._skip_flow(end)
         stepper.run("limit")
         h = stepper.get("work.h")
         start, states = self.time, self._read_states()
@@ -209,6 +222,19 @@ class ContinuousRun:
         stepper.run("flow")
         stepper.run("advance_time")
         return self._arrive(end, (start, stop, states, age))
+
+    def _skip_flow(self, end: Fraction) -> bool:
+        """Move time to the end of a step that is too short for a flow; there is no event."""
+        self._records.record_step(self.time)
+        self.stepper.set("work.left", 0.0)
+        while self._looks and self._looks[0] < end:
+            self._look(self._looks.popleft())
+        self.time = end
+        self._place(end)
+        if self._around.has_observers:
+            self.stepper.run("equations")
+            self._around.observe_boundary(end)
+        return False
 
     def _arrive(self, end: Fraction, flow: FlowSegment | None = None) -> bool:
         """Time has elapsed up to the end of the step or an event, which it tells."""

@@ -55,14 +55,17 @@ class FirstOrderLag:
     def evaluate(self, time: Fraction, value: float) -> float:
         """Return the output at a time [s] at which the input is `value`; the lag is not advanced.
 
-        Without a lag this is `value`. Before the first `advance`, and for a time that is not after
-        the last one, it is the present output.
+        Without a lag this is `value`. Before the first `advance`, for a time that is not after the
+        last one, and if the time between them is too short to divide by it, it is the present
+        output.
         """
         if self._lag == 0.0:
             return value
         if self._time is None or time <= self._time:
             return self._value
         h = float(time - self._time)
+        if h == 0.0 or math.isinf(self._lag / h):
+            return self._value
         slope = (value - self._input) * (self._lag / h)
         return value - slope + (self._value - self._input + slope) * _decay(h / self._lag)
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any
 
+from engine.execution.event_loop import SimulationStopped
 from engine.interpreter.interpreter import Stepper
+from engine.simulation.input_connections import describe_instant
 from engine.simulation.signal_values import Signals
+from language.ir.number_type import MAX_FINITE
 from language.ir.program import Program
 from language.model.system import Connection
 
@@ -44,6 +48,8 @@ class SystemEnvironment:
         self.names = (*self._outputs, *(run.sensor.name for run in self._unsampled))
         self._read = stepper.make_reader(tuple(wire.source for wire in program.outputs))
         self._since = Fraction(0)
+        self._program = program
+        self._largest = MAX_FINITE[program.number_type]
         self.has_observers = bool(self._lagging)
         self.has_constant_inputs = not self._varying
 
@@ -52,17 +58,33 @@ class SystemEnvironment:
 
         A parabola interpolates the input at the start, the middle and the end of the flow:
         `input.<name>` is the value at the start, `work.rise_<name>` and `work.bend_<name>` are the
-        factors of s and s^2. Other inputs are unchanged.
+        factors of s and s^2. Other inputs are unchanged. Raises SimulationStopped if a factor is
+        too large for the number type.
         """
         self._since = start
         h = float(stop - start)
         for connection in self._varying:
             value = self._input_function(connection)
             first, middle, last = value(start), value((start + stop) / 2), value(stop)
+            rise = (4.0 * middle - 3.0 * first - last) / h
+            bend = 2.0 * (first - 2.0 * middle + last) / (h * h)
             name = connection.target[1]
+            if not (abs(rise) <= self._largest and abs(bend) <= self._largest):
+                self._require_finite(name, start, (first, middle, last), h)
             self._stepper.set(f"input.{name}", first)
-            self._stepper.set(f"work.rise_{name}", (4.0 * middle - 3.0 * first - last) / h)
-            self._stepper.set(f"work.bend_{name}", 2.0 * (first - 2.0 * middle + last) / (h * h))
+            self._stepper.set(f"work.rise_{name}", rise)
+            self._stepper.set(f"work.bend_{name}", bend)
+
+    def _require_finite(self, name: str, time: Fraction, values: Sequence[float], h: float) -> None:
+        """Raise SimulationStopped if an input over `h` [s] is finite and its slope is not.
+
+        Values that are not finite are left to the states that they make not finite.
+        """
+        if all(math.isfinite(value) for value in values):
+            place = describe_instant(self.name, self._program, self._stepper, time)
+            text = f"input `{name}` changes from {values[0]:.3g} to {values[-1]:.3g} in {h:.3g} s"
+            number_type = self._program.number_type
+            raise SimulationStopped(f"{place}: {text}: {number_type} has no such slope")
 
     def set_inputs(self, time: Fraction) -> None:
         """Set the varying inputs to their values at a time [s] of the flow; others are unchanged.

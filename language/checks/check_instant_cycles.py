@@ -15,6 +15,7 @@ from language.expressions.syntax_tree import Name, Relation, SyntaxTree, walk
 from language.ir.analysis_cache import cache_on_owner
 from language.ir.ops import Expr, Unary
 from language.lowering.constants import evaluate_exactly
+from language.lowering.event_tolerance import is_instantaneous
 from language.model.automaton import Automaton, Mode, Transition
 from language.model.graph_algorithms import strongly_connected_components
 from language.smt.bound_propagation import is_disproved_by_bounds
@@ -110,12 +111,16 @@ def instant_cycles(automaton: Automaton) -> tuple[Cycle, ...]:
 
 
 def instant_transitions(automaton: Automaton) -> list[Transition]:
-    """Return the transitions of all modes without a wait, or with a wait of 0."""
+    """Return the transitions of a continuous automaton without a wait, or with a wait of 0.
+
+    A wait within the tolerance of rule 10 is 0.
+    """
     transitions = [transition for mode in automaton.all_modes for transition in mode.transitions]
     return [
         transition
         for transition in transitions
-        if not (transition.wait and evaluate_exactly(transition.wait, automaton))
+        if not transition.wait
+        or is_instantaneous(automaton, evaluate_exactly(transition.wait, automaton))
     ]
 
 

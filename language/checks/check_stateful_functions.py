@@ -13,6 +13,7 @@ from language.expressions.syntax_tree import (
     names,
     walk,
 )
+from language.ir.program import MAX_TIMER_TICKS
 from language.lowering.constants import evaluate_exactly
 from language.lowering.continuous_delay import tunable_delay_of
 from language.lowering.delay_buffers import (
@@ -20,14 +21,12 @@ from language.lowering.delay_buffers import (
     expression_type,
     memory_calls_by_key,
 )
+from language.lowering.event_tolerance import is_instantaneous
 from language.lowering.program_parameters import parameter_kinds
 from language.model.automaton import Automaton, Transition
 from language.model.declaration import Formula
 from language.model.region_queries import equation_names
 from language.text.diagnostic import Problems
-
-MAX_AFTER_TICKS = 65535
-"""Largest `after` in ticks: its counter is a uint16."""
 
 
 def check_memory(automaton: Automaton, problems: Problems) -> None:
@@ -35,7 +34,7 @@ def check_memory(automaton: Automaton, problems: Problems) -> None:
 
     These are times that are not constant or negative, `delay` of more than MAX_DELAY ticks or major
     steps or (continuous) of less than one major step, `after` or `every` of more than
-    MAX_AFTER_TICKS ticks, an `every` of 0 or of no whole number of periods, delayed names without
+    MAX_TIMER_TICKS ticks, an `every` of 0 or of no whole number of periods, delayed names without
     an equation in some mode, a delay of a value that is no real or `changed` of a real in a
     continuous automaton, and edges or `every` on transitions with a positive wait.
     """
@@ -47,7 +46,7 @@ def check_memory(automaton: Automaton, problems: Problems) -> None:
         if tree.function == "delay":
             _check_time(automaton, tree, tree.arguments[1], MAX_DELAY, problems)
     for tree in memory_calls_by_key(automaton, TIME_FUNCTIONS).values():
-        _check_time(automaton, tree, tree.arguments[0], MAX_AFTER_TICKS, problems)
+        _check_time(automaton, tree, tree.arguments[0], MAX_TIMER_TICKS, problems)
     for tree in memory_calls_by_key(automaton, ("every",)).values():
         with problems.collect_errors():
             _check_period(automaton, tree, problems)
@@ -95,12 +94,17 @@ def _check_time(
 def _check_period(automaton: Automaton, tree: FunctionCall, problems: Problems) -> None:
     """Report a time of `every` that is zero or not a whole number of periods.
 
-    Rounding the time to ticks would let it drift.
+    Rounding the time to ticks would let it drift. In a continuous automaton a time within the
+    tolerance of rule 10 is reported: the run would stop as Zeno behaviour (rule 12).
     """
     time = tree.arguments[0]
     value = evaluate_exactly(Formula(time, ""), automaton)
     if value == 0:
         problems.error("wait", time.span, "the time of `every` is above zero")
+    elif value > 0 and not automaton.period and is_instantaneous(automaton, value):
+        label = f"`every` of {float(value):g} s has more than 100 instants in a major step"
+        hint = f"a longer time, or a shorter `step` than {float(automaton.step):g} s"
+        problems.error("wait", time.span, label, hint)
     elif automaton.period and value > 0 and (value / automaton.period).denominator != 1:
         label = f"`every` of {float(value / automaton.period):g} ticks would drift"
         hint = f"a whole number of periods of {float(automaton.period):g} s"

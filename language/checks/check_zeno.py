@@ -8,9 +8,10 @@ state. A bouncing ball has one at rest; a thermostat with a single limit has one
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 
 from language.checks.check_instant_cycles import Cycle, instant_transitions
-from language.expressions.syntax_tree import NEGATED_RELATION, FunctionCall, walk
+from language.expressions.syntax_tree import NEGATED_RELATION, FunctionCall, names, walk
 from language.ir.ops import Binary, Call, Compare, Expr, Ref, Unary, Value, multiply, real, subtract
 from language.model.automaton import Automaton, Transition
 from language.smt.lie_derivative import LieDerivative, UnknownRateError
@@ -77,29 +78,34 @@ def _find_zeno_equilibrium(
     """Return a Zeno equilibrium of a cycle.
 
     None if none is found or the resets are not contracting. At the equilibrium each guard is
-    enabled at once along the flow of its mode, and no reset changes a state. z3 solves the exact
-    conditions; the witness is confirmed with equalities relaxed to a tolerance.
+    enabled at once along the flow of its mode, no transition of a smaller priority is, and no reset
+    changes a state or a discrete variable that the guards read. z3 solves the exact conditions; the
+    witness is confirmed with equalities relaxed to a tolerance.
     """
     path = SymbolicPath()
     start = snapshot = GuardSnapshot(automaton, automaton.source_mode(cycle[0]), path)
     exact: list[Expr] = []
     relaxed: list[Expr] = []
     assigned: dict[str, Expr] = {}
+    kept = [*automaton.states, *_discrete_names_read(automaton, cycle)]
     for transition in cycle:
         guard = snapshot.lower_expression(transition.when.tree)
         becoming = _EnablingCondition(snapshot)
         exact.append(becoming.condition_for(guard, True))
         relaxed.append(_relax_equalities(exact[-1]))
+        others = _exclude_urgent_transitions(becoming, transition)
+        exact += others
+        relaxed += others
         after = snapshot.apply_transition(transition)
-        for state in automaton.states:
+        for state in kept:
             if after.bindings[state] != start.bindings[state]:
                 known = start.bindings[state]
-                assigned.update(
-                    {known.name: after.bindings[state]} if isinstance(known, Ref) else {}
-                )
+                if isinstance(known, Ref) and state in automaton.states:
+                    assigned[known.name] = after.bindings[state]
                 same = Compare("==", after.bindings[state], start.bindings[state])
                 exact.append(same)
-                relaxed.append(_relax_equalities(same))
+                is_real = automaton.state_variables[state].type == "real"
+                relaxed.append(_relax_equalities(same) if is_real else same)
         snapshot = after
     witness = query_engine.find_confirmed_witness(
         query_engine.build_query(path, exact), query_engine.build_query(path, relaxed)
@@ -109,6 +115,43 @@ def _find_zeno_equilibrium(
         if witness and _is_contracting(assigned, query_engine.build_query(path, relaxed), witness)
         else None
     )
+
+
+def _exclude_urgent_transitions(becoming: _EnablingCondition, transition: Transition) -> list[Expr]:
+    """Return the conditions that no transition of a smaller priority takes the place of another.
+
+    A transition does so if its guard is true at once along the flow, or true and not false at once.
+    Transitions with a wait do not, nor do those whose guards cannot be lowered or differentiated.
+    """
+    found: list[Expr] = []
+    snapshot = becoming.snapshot
+    for other in snapshot.mode.transitions:
+        if (other.priority or 0) >= (transition.priority or 0):
+            continue
+        if other not in instant_transitions(snapshot.automaton):
+            continue
+        with suppress(KeyError, SpecError, UnknownRateError):
+            guard = snapshot.lower_expression(other.when.tree)
+            begins, ends = (becoming.condition_for(guard, truth) for truth in (True, False))
+            stays = Binary("and", guard, Unary("not", ends))
+            found.append(Unary("not", Binary("or", begins, stays)))
+    return found
+
+
+def _discrete_names_read(automaton: Automaton, cycle: Cycle) -> list[str]:
+    """Return the discrete variables that the guards of a cycle read, also through equations."""
+    found: set[str] = set()
+    for transition in cycle:
+        equations = automaton.source_mode(transition).equations
+        pending = {name.path for name in names(transition.when.tree)}
+        seen: set[str] = set()
+        while pending:
+            path = pending.pop()
+            seen.add(path)
+            if path in equations:
+                pending |= {name.path for name in names(equations[path].tree)} - seen
+        found |= seen
+    return [name for name in automaton.discrete if name in found]
 
 
 def _is_contracting(assigned: Mapping[str, Expr], query: SolverQuery, witness: Witness) -> bool:

@@ -11,12 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from fractions import Fraction
 
 from language.expressions.units import rate_dimension
 from language.integration.dense_output import DenseOutput, event_search_block
 from language.integration.vector_field import VectorField, any_guard_condition, set_point_time
-from language.ir.number_type import SIGNIFICAND_BITS, NumberType
+from language.ir.number_type import NumberType
 from language.ir.ops import (
     Assign,
     Binary,
@@ -42,11 +41,6 @@ from language.lowering.guard_variable_names import guard_slots
 from language.model.automaton import Mode
 from language.model.constant_states import constant_states, ever_varying_states
 
-MERGE_ULPS = 4096
-"""Events that are closer than this are one instant (rule 10).
-
-Rounding moves a crossing by about ten units in the last place.
-"""
 RUN_BISECTIONS = 24
 """Bisections inside a tick: 1 ms / 2^24 = 60 ps (rule 9); in float32 one unit in the last place."""
 FLOW_BISECTIONS: Mapping[NumberType, int] = {"float64": 44, "float32": 24}
@@ -93,15 +87,6 @@ def clear_constant_series(field: VectorField, mode: str, terms: int) -> list[Op]
     still = constant_states(field.automaton.modes[mode])
     names = [name for name in ever_varying_states(field.automaton) if name in still]
     return [Store(f"work.series_{n}", integer(k), real(0.0)) for n in names for k in range(terms)]
-
-
-def merge_time(number: NumberType, step: Fraction) -> float:
-    """Return the time [s] within which events are one instant (rule 10).
-
-    It is MERGE_ULPS units in the last place of the step [s]: in float64 0.9 ps for 1 s, in float32
-    0.5 us for 1 ms.
-    """
-    return float(step) * MERGE_ULPS * 2.0 ** (1 - SIGNIFICAND_BITS[number])
 
 
 def continuous_step_blocks(

@@ -37,8 +37,13 @@ The array exists if a tick may have several micro-steps; a 0 ends each micro-ste
 ValueType = Literal["real", "truth", "whole"]
 TICK_UNIT = "tick"
 """Unit of a tunable wait on a calibration page."""
-MAX_TIMER_TICKS = 65535
-"""Largest value of a tick counter (rule 4)."""
+MAX_TIMER_TICKS = 2**31 - 1
+"""Largest value of a tick counter (rule 4): 24.8 days of ticks of 1 ms.
+
+A whole number of the language holds it too.
+"""
+SHORT_TIMER_TICKS = 2**16 - 1
+"""Largest value of a tick counter of 16 bits in C."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +51,7 @@ class Variable:
     """A variable with its type and unit; `size` is the length of an array, 0 for a scalar.
 
     `values` are the names of the numbers 0, 1, ... of an enumeration. `range` is the declared range
-    [SI] whose violation the engine reports.
+    [SI] whose violation the engine reports. `largest` is the value at which a tick counter stops.
     """
 
     name: str
@@ -56,6 +61,7 @@ class Variable:
     about: str = ""
     values: tuple[str, ...] = ()
     range: tuple[float, float] | None = None
+    largest: int = SHORT_TIMER_TICKS
 
 
 @dataclass(frozen=True)
@@ -101,7 +107,7 @@ class TransitionInfo:
     `slot` is the suffix of the variables of its guard (language/model/region_queries.py).
     `rewind_ticks` is the largest number of ticks that the transition goes back. `chart_endpoints`
     are the paths of source and target in a chart, "" for none. `tunable_wait` is the constant that
-    holds a tunable wait in ticks.
+    holds a tunable wait in ticks, and `max_ticks` the end of its range; 0 for a fixed wait.
     """
 
     number: int
@@ -117,14 +123,18 @@ class TransitionInfo:
     rewind_ticks: int = 0
     chart_endpoints: tuple[str, str] | None = None
     tunable_wait: str | None = None
+    max_ticks: int = 0
 
     @property
     def timer_limit(self) -> int:
         """The value at which the wait counter saturates.
 
-        It is `ticks` + 1, or MAX_TIMER_TICKS for a tunable wait.
+        It is `ticks` + 1; for a tunable wait the largest value of a counter that can count more
+        than `max_ticks`.
         """
-        return MAX_TIMER_TICKS if self.tunable_wait else self.ticks + 1
+        if self.tunable_wait is None:
+            return self.ticks + 1
+        return SHORT_TIMER_TICKS if self.max_ticks < SHORT_TIMER_TICKS else MAX_TIMER_TICKS
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ NodeT = TypeVar("NodeT")
 def round_program(program: Program) -> Program:
     """Return a Program with its literals and constants rounded to its number type.
 
-    Of a constant these are a real value, the array items and the range. A Program in float64 is
+    Of a real constant these are the value, the array items and the range. A Program in float64 is
     returned unchanged. The bodies of functions are not changed: they exist for each type.
     """
     number = program.number_type
@@ -43,13 +43,16 @@ def round_block(block: Block, number_type: NumberType) -> Block:
 
 
 def _round_constant(constant: Constant, number_type: NumberType) -> Constant:
-    """Return a constant with its real value, its array items and its range rounded to a type."""
+    """Return a real constant with its value, its array items and its range rounded to a type.
+
+    Other constants are returned unchanged: a float32 has not all whole numbers.
+    """
+    if constant.type != "real":
+        return constant
     limits = constant.range
     return dataclasses.replace(
         constant,
-        value=round_to_type(constant.value, number_type)
-        if constant.type == "real"
-        else constant.value,
+        value=round_to_type(constant.value, number_type),
         items=tuple(round_to_type(item, number_type) for item in constant.items),
         range=(round_to_type(limits[0], number_type), round_to_type(limits[1], number_type))
         if limits

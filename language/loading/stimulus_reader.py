@@ -22,6 +22,7 @@ from language.expressions.syntax_tree import (
     walk,
 )
 from language.expressions.units import NO_UNIT, SECOND, Unit, are_compatible, parse_unit
+from language.ir.number_type import MAX_FINITE
 from language.model.declaration import Formula
 from language.model.system import Stimulus, StimulusPiece, SystemInput
 from language.readers.base_reader import Reader
@@ -38,6 +39,8 @@ DISCONTINUOUS = (Conditional, Relation, Logic, Not, BoolLiteral)
 """Nodes of expressions that make a formula of time discontinuous."""
 TIME = Unit("s", Fraction(1), SECOND)
 PER_SECOND = parse_unit("1/s")
+LARGEST_SLOPE = MAX_FINITE["float64"]
+"""Largest slope of an input [SI/s]."""
 Breakpoint = tuple[Fraction, Fraction]
 """A time [s] and the value (SI) at that time."""
 
@@ -253,7 +256,9 @@ class StimulusReader(Reader):
             self.problems.error("missing", entry.span, "a `table` has at least one point")
         if not points or len(self.problems.reported) > known:
             return (StimulusPiece(Fraction(0), Fraction(0)),)
-        return linear_pieces(points) if hold == "linear" else constant_pieces(points)
+        if hold != "linear":
+            return constant_pieces(points)
+        return self._require_finite_slopes(linear_pieces(points), entry.span)
 
     def _read_time_span(self, table: MappingNode, what: str) -> tuple[Fraction, Fraction]:
         """Return `from` and `to` [s]; an end that is not after the begin is reported."""
@@ -272,6 +277,17 @@ class StimulusReader(Reader):
         begin, end = self._read_time_span(ramp, "ramp")
         value, _ = self.read_quantity(ramp.get("value"), "value", ramp.span, unit)
         pieces = linear_pieces([(begin, first.value), (end, value)])
+        return self._require_finite_slopes(pieces, ramp.span)
+
+    def _require_finite_slopes(
+        self, pieces: tuple[StimulusPiece, ...], span: Span
+    ) -> tuple[StimulusPiece, ...]:
+        """Return the pieces; the first slope that no float64 holds is reported."""
+        steep = next((p for p in pieces if abs(p.slope) > LARGEST_SLOPE), None)
+        if steep is not None:
+            label = f"from {float(steep.start):g} s on the input is steeper than "
+            label += f"{LARGEST_SLOPE:.1e} per second"
+            self.problems.error("range", span, label, "a jump is one of `steps`: an event")
         return pieces
 
     def _read_chirp(
@@ -294,6 +310,10 @@ class StimulusReader(Reader):
             return (first,)
         span = chirp.span
         half_rate = (rates[1] - rates[0]) / (2 * (end - begin))
+        if abs(half_rate) > LARGEST_SLOPE:
+            label = f"the frequency changes by more than {LARGEST_SLOPE:.1e} Hz per second"
+            self.problems.error("range", span, label, "a longer sweep, or frequencies that exist")
+            return (first,)
         since = Arithmetic("-", Name("time", span), NumberLiteral(begin, TIME, span), span)
         cycles: SyntaxTree = _product(
             since, _sum(_number(rates[0], span), _product(_number(half_rate, span), since))

@@ -34,6 +34,7 @@ from language.ir.ops import (
     Select,
     Store,
     Unary,
+    Value,
     add,
     divide,
     integer,
@@ -44,6 +45,7 @@ from language.ir.ops import (
 from language.ir.program import Alarm, Variable
 from language.lowering.constants import evaluate_exactly
 from language.lowering.delay_buffers import memory_calls_by_key
+from language.lowering.event_tolerance import is_instantaneous
 from language.lowering.expressions import NameBindings, lower_expression
 from language.lowering.program_parameters import constant_bindings
 from language.model.automaton import Automaton, Mode
@@ -271,13 +273,15 @@ def alarms_of(automaton: Automaton) -> tuple[Alarm, ...]:
     """Return an alarm for each different `after` and `every` in the guards of each mode.
 
     The variables are `memory.after_<n>` and `memory.every_<n>`, numbered from 1 over both. The
-    times [s] are exact; `every` repeats. Raises SpecError if a time is not made of numbers and
-    parameters.
+    times [s] are exact; `every` repeats. An `after` that is true from the entry on has no alarm.
+    Raises SpecError if a time is not made of numbers and parameters.
     """
     found: list[Alarm] = []
     for mode in automaton.all_modes:
         for tree in _timer_calls(mode).values():
-            time = evaluate_exactly(Formula(tree.arguments[0], ""), automaton)
+            time = _time_of(automaton, tree)
+            if _is_always_true(automaton, tree):
+                continue
             name = f"memory.{tree.function}_{len(found) + 1}"
             repeats = tree.function == "every"
             found.append(Alarm(name, mode.region, mode.number, time, repeats))
@@ -285,15 +289,32 @@ def alarms_of(automaton: Automaton) -> tuple[Alarm, ...]:
 
 
 def alarm_bindings(automaton: Automaton) -> Mapping[str, NameBindings]:
-    """Return the alarm variables of `after` and `every`, by key path of mode, then memory key.
+    """Return the conditions of `after` and `every`, by key path of mode, then memory key.
+
+        after(d)    ->    true               if d is at most the tolerance of rule 10
+        after(d)    ->    memory.after_<n>   else
+        every(d)    ->    memory.every_<n>
 
     Each mode has an entry, which may be empty.
     """
     alarms = iter(alarms_of(automaton))
     return {
-        mode.key: {key: Ref(next(alarms).variable) for key in _timer_calls(mode)}
+        mode.key: {
+            key: Value(True) if _is_always_true(automaton, tree) else Ref(next(alarms).variable)
+            for key, tree in _timer_calls(mode).items()
+        }
         for mode in automaton.all_modes
     }
+
+
+def _time_of(automaton: Automaton, tree: FunctionCall) -> Fraction:
+    """Return the exact time [s] of an `after` or `every`."""
+    return evaluate_exactly(Formula(tree.arguments[0], ""), automaton)
+
+
+def _is_always_true(automaton: Automaton, tree: FunctionCall) -> bool:
+    """Return whether a call is an `after` whose time has passed at the entry of its mode."""
+    return tree.function == "after" and is_instantaneous(automaton, _time_of(automaton, tree))
 
 
 def _timer_calls(mode: Mode) -> dict[str, FunctionCall]:

@@ -211,10 +211,10 @@ def activation_variables(automaton: Automaton) -> list[Variable]:
             found.append(Variable(f"memory.last_{edge.number}", kind, about=about))
     for timer, mode, longest in _after_timers(automaton).values():
         about = f"ticks since entry of `{mode.name}`, at most {longest}"
-        found.append(Variable(timer, "whole", about=about))
+        found.append(Variable(timer, "whole", about=about, largest=longest))
     for trigger in _periodic_triggers(automaton).values():
         about = f"ticks in `{trigger.mode.name}`, from 1 to {trigger.period_ticks} in turn"
-        found.append(Variable(trigger.timer, "whole", about=about))
+        found.append(Variable(trigger.timer, "whole", about=about, largest=trigger.period_ticks))
     return found
 
 

@@ -17,9 +17,15 @@ from language.ir.ops import (
 )
 from language.ir.program import TransitionInfo
 from language.lowering.constants import evaluate_exactly
+from language.lowering.event_tolerance import is_instantaneous
 from language.lowering.guard_variable_names import guard_slot
 from language.lowering.tick_history import rollbacks_of
-from language.lowering.wait_ticks import MAX_WAIT_TICKS, seconds_to_ticks, tunable_wait
+from language.lowering.wait_ticks import (
+    MAX_WAIT_TICKS,
+    seconds_to_ticks,
+    tunable_wait,
+    wait_range_in_ticks,
+)
 from language.model.automaton import Automaton, Mode, Transition
 from language.text.diagnostic import Problems
 
@@ -28,8 +34,8 @@ def transition_infos(automaton: Automaton, problems: Problems) -> tuple[Transiti
     """Return the data of all transitions, numbered from 1 in the order of the file.
 
     A timer `timer.<mode>_<transition>` is given if the wait has at least one tick or is tunable; in
-    a continuous automaton, if it is above 0. A wait that is negative, longer than MAX_WAIT_TICKS or
-    not constant is reported.
+    a continuous automaton, if it is longer than the tolerance of rule 10. A wait that is negative,
+    longer than MAX_WAIT_TICKS or not constant is reported.
     """
     found: list[TransitionInfo] = []
     back = {rollback.transition.key: rollback.max_ticks for rollback in rollbacks_of(automaton)}
@@ -46,7 +52,9 @@ def transition_infos(automaton: Automaton, problems: Problems) -> tuple[Transiti
             if transition.wait and ticks > MAX_WAIT_TICKS:
                 label = f"a wait of {ticks} ticks is longer than {MAX_WAIT_TICKS}"
                 problems.error("wait", transition.wait.span, label)
-            timed = (ticks > 0 or tunable is not None) if automaton.period else wait > 0
+            is_timed = not is_instantaneous(automaton, wait)
+            if automaton.period:
+                is_timed = ticks > 0 or tunable is not None
             target = 0 if automaton.statechart else automaton.target_mode(transition).number
             found.append(
                 TransitionInfo(
@@ -56,16 +64,22 @@ def transition_infos(automaton: Automaton, problems: Problems) -> tuple[Transiti
                     target=target,
                     wait=wait,
                     ticks=ticks,
-                    timer=f"timer.{mode.label}_{transition.name}" if timed else None,
+                    timer=f"timer.{mode.label}_{transition.name}" if is_timed else None,
                     key=f"{automaton.name} {transition.key}",
                     region=mode.region,
                     slot=guard_slot(mode.region, k),
                     rewind_ticks=back.get(transition.key, 0),
                     chart_endpoints=_chart_endpoints(automaton, transition),
                     tunable_wait=f"calibration.{tunable}" if tunable else None,
+                    max_ticks=_max_ticks(automaton, tunable) if tunable else 0,
                 )
             )
     return tuple(found)
+
+
+def _max_ticks(automaton: Automaton, tunable: str) -> int:
+    """Return the end of the range of a tunable wait in ticks."""
+    return int(wait_range_in_ticks(automaton, automaton.parameters[tunable])[1])
 
 
 def wait_ticks(info: TransitionInfo) -> Expr:

@@ -19,7 +19,7 @@ from language.model.used_names import names_read_by
 from language.text.diagnostic import Problems
 
 MAX_WAIT_TICKS = MAX_TIMER_TICKS - 1
-"""The longest wait in ticks: the counters are uint16 and count one tick more (rule 4a)."""
+"""The longest wait in ticks: the counters count one tick more (rule 4a)."""
 
 
 def tunable_wait(automaton: Automaton, wait: Formula | None) -> str | None:
@@ -47,25 +47,35 @@ def seconds_to_ticks(automaton: Automaton, time: Fraction) -> int:
     return math.ceil(time / automaton.period)
 
 
-def wait_range_in_ticks(automaton: Automaton, parameter: Parameter) -> Range:
-    """Return the smallest and the largest whole number of ticks in the range of a tunable wait.
+def ticks_to_seconds(automaton: Automaton, parameter: Parameter, ticks: int) -> Fraction:
+    """Return a time [s] of a tunable wait that lasts a number of ticks.
 
-    The ends are the lower bound rounded up and the upper one rounded down. Without a declared range
-    it is (0, MAX_WAIT_TICKS). The first exceeds the second if no whole tick lies in the range.
+    It is `ticks` periods, but at most the end of the declared range, which may lie inside the last
+    tick.
+    """
+    assert automaton.period
+    time = ticks * automaton.period
+    is_last = parameter.range and ticks == seconds_to_ticks(automaton, parameter.range[1])
+    return min(time, parameter.range[1]) if parameter.range and is_last else time
+
+
+def wait_range_in_ticks(automaton: Automaton, parameter: Parameter) -> Range:
+    """Return the smallest and the largest number of ticks of the waits in a declared range.
+
+    Each end is rounded up to whole ticks, as a wait is. Without a declared range it is (0,
+    MAX_WAIT_TICKS).
     """
     if parameter.range is None:
         return Fraction(0), Fraction(MAX_WAIT_TICKS)
-    assert automaton.period
-    low, high = (end / automaton.period for end in parameter.range)
-    return Fraction(math.ceil(low)), Fraction(math.floor(high))
+    low, high = (seconds_to_ticks(automaton, end) for end in parameter.range)
+    return Fraction(low), Fraction(high)
 
 
 def check_tunable_waits(automaton: Automaton, problems: Problems) -> None:
     """Report each tunable wait that cannot be stored as a count of ticks.
 
     These are waits that are parameters of the model, that another formula reads too, or whose range
-    is not usable. A range is usable if it lies within 0 to MAX_WAIT_TICKS, holds a whole tick, and
-    holds the value rounded up to ticks. Nothing is raised.
+    is not usable. A range is usable if it lies within 0 to MAX_WAIT_TICKS. Nothing is raised.
     """
     waits = tunable_waits(automaton)
     if not waits:
@@ -81,18 +91,11 @@ def check_tunable_waits(automaton: Automaton, problems: Problems) -> None:
             label = f"`{name}` is a tunable wait, and read elsewhere too"
             hint = "a tunable wait is stored in ticks: use a separate parameter for it"
             problems.error("wait", parameter.span, label, hint)
-        low, high = wait_range_in_ticks(automaton, parameter)
+        _, high = wait_range_in_ticks(automaton, parameter)
         ticks = seconds_to_ticks(automaton, parameter.value or Fraction(0))
-        if (parameter.range and parameter.range[0] < 0) or high > MAX_WAIT_TICKS:
+        if (parameter.range and parameter.range[0] < 0) or max(high, ticks) > MAX_WAIT_TICKS:
             label = f"`{name}` is a wait: its range is within 0 to {MAX_WAIT_TICKS} ticks"
             problems.error("wait", parameter.span, label)
-        elif low > high:
-            label = f"`{name}` is a wait: its range has no whole tick of {automaton.period} s"
-            problems.error("wait", parameter.span, label)
-        elif not low <= ticks <= high:
-            label = f"`{name}` is a wait of {ticks} ticks: within its range are {low} to {high}"
-            hint = "a wait is rounded up to whole ticks"
-            problems.error("wait", parameter.span, label, hint)
 
 
 def _all_transitions(automaton: Automaton) -> Iterator[Transition]:

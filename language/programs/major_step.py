@@ -16,7 +16,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from language.integration.crossing_location import merge_time
 from language.integration.vector_field import VectorField, run_block_by_mode
 from language.ir.ops import (
     Assign,
@@ -41,6 +40,7 @@ from language.ir.ops import (
 )
 from language.ir.program import Alarm, TransitionInfo, Variable
 from language.ir.traversal import names_used, reachable_blocks
+from language.lowering.event_tolerance import merge_time
 from language.lowering.expressions import WHOLE_TYPES
 from language.lowering.program_builder import any_fired_condition, clear_fired
 from language.model.automaton import Mode

@@ -16,7 +16,6 @@ from language.integration.crossing_location import (
     RUN_BISECTIONS,
     continuous_step_blocks,
     continuous_step_variables,
-    merge_time,
 )
 from language.integration.method_selection import build_method
 from language.integration.vector_field import (
@@ -48,6 +47,7 @@ from language.ir.ops import (
 from language.ir.program import Constant, IntegrationInfo, Variable, mode_variable
 from language.ir.root_region import CHART
 from language.lowering.delay_buffers import find_memory_call
+from language.lowering.event_tolerance import merge_time
 from language.lowering.expressions import variable_bindings
 from language.lowering.linearisation import LinearisationPoint, linearise_model
 from language.lowering.program_builder import enter_initial_modes

@@ -54,7 +54,7 @@ def sampled_variables(
     for info in transitions:
         if info.timer:
             about = f"ticks that the guard has been true, at most {info.timer_limit}"
-            found.append(Variable(info.timer, "whole", about=about))
+            found.append(Variable(info.timer, "whole", about=about, largest=info.timer_limit))
     found += observer_variables(automaton)
     found += covariance_variables(automaton)
     found += input_change_variables(automaton)

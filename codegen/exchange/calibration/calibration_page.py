@@ -12,6 +12,7 @@ from codegen.exchange.calibration.characteristic import Cell, FileAxis, FileChar
 from language.expressions.units import display_unit
 from language.ir.number_type import NumberType, round_to_type, shortest_decimal
 from language.ir.program import TICK_UNIT, Constant, Program, unqualified_name
+from language.lowering.wait_ticks import ticks_to_seconds
 from language.model.automaton import Automaton
 from language.overlays.literal_format import format_exact
 from language.typecheck.lookup_table import LookupTable
@@ -93,8 +94,8 @@ def _page_characteristic(
 
 def _wait_as_time(automaton: Automaton, program: Program, constant: Constant) -> FileCharacteristic:
     """Return a tunable wait, which the page holds in ticks, as a characteristic in seconds."""
-    assert automaton.period
-    time = int(constant.value) * automaton.period
+    parameter = automaton.parameters[unqualified_name(constant.name)]
+    time = ticks_to_seconds(automaton, parameter, int(constant.value))
     name = Cell(page_name(program, constant))
     return FileCharacteristic(name, (Cell(format_exact(time)),), Cell("s"), about=constant.about)
 

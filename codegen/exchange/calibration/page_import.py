@@ -31,6 +31,7 @@ from codegen.exchange.calibration.value_conversion import (
 )
 from language.expressions.units import NO_UNIT, parse_unit
 from language.ir.program import TICK_UNIT, Constant, Program, unqualified_name
+from language.lowering.wait_ticks import ticks_to_seconds
 from language.model.automaton import Automaton
 from language.model.declaration import Parameter
 from language.overlays.literal_format import (
@@ -210,8 +211,9 @@ def _read_ticks(
     nearest_ticks = round(exact_ticks)
     is_whole = abs(exact_ticks - nearest_ticks) <= TICK_TOLERANCE * max(nearest_ticks, 1)
     ticks = nearest_ticks if is_whole else math.ceil(exact_ticks)
-    time = ticks * context.automaton.period
-    if not is_whole:
+    parameter = context.automaton.parameters[unqualified_name(constant.name)]
+    time = ticks_to_seconds(context.automaton, parameter, ticks)
+    if not is_whole and number * unit.factor != time:
         text = f"`{cell.text}` is rounded up to {format_exact(time)} s, {ticks} ticks"
         context.add_remark("rounded", characteristic.name, text, cell.span)
     elif unit.factor != 1:
@@ -220,14 +222,14 @@ def _read_ticks(
         context.add_remark("converted", characteristic.name, text, cell.span)
     low, high = constant.range
     if not low <= ticks <= high or exact_ticks < -TICK_TOLERANCE:
-        ends = " to ".join(format_exact(int(end) * context.automaton.period) for end in (low, high))
+        times = (ticks_to_seconds(context.automaton, parameter, int(end)) for end in (low, high))
+        ends = " to ".join(format_exact(time) for time in times)
         label = (
             f"`{characteristic.name.text}` = {cell.text} {unit.text} is outside its range, {ends} s"
         )
         context.problems.error("range", cell.span, label)
         return None
-    own = context.automaton.parameters[unqualified_name(constant.name)].unit
-    return ScalarNode(format_exact_in_unit(time, own), cell.span)
+    return ScalarNode(format_exact_in_unit(time, parameter.unit), cell.span)
 
 
 def _read_integer(cell: Cell, parameter: Parameter, problems: Problems) -> int | None:

@@ -183,7 +183,7 @@ def _parameter_variables(program: Program, version: Version) -> Iterator[FmuVari
         group = "cal.solved." if constant.kind == "solved" else "cal."
         name = ("solved." if constant.kind == "solved" else "") + unqualified_name(constant.name)
         variable = Variable(constant.name, constant.type, constant.unit, values=constant.values)
-        storage_type, member = c_type(variable, program.number_type), c_member(constant.name)
+        storage_type, member = c_type(constant, program.number_type), c_member(constant.name)
         made = _make_variable(program, version, variable, storage_type, group + member, "parameter")
         made = dataclasses.replace(_with_limits(made, program, constant), name=name)
         about = constant.about or constant.key

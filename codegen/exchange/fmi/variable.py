@@ -39,6 +39,7 @@ TYPE_LIMITS: Mapping[str, tuple[str, str]] = {
     "int32_t": ("-2147483648.0", "2147483647.0"),
     "uint8_t": ("0.0", "255.0"),
     "uint16_t": ("0.0", "65535.0"),
+    "uint32_t": ("0.0", "4294967295.0"),
 }
 """The smallest and largest value of a settable member by C type, as C expressions."""
 

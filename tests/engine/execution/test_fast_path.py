@@ -11,6 +11,7 @@ import pytest
 import modewright as mw
 from engine.execution.event_loop import ContinuousRun, PartialStep
 from engine.results.trajectory import Trajectory
+from tests.language.spec_builders import project_of
 
 PLANT = """
 language: 1
@@ -35,6 +36,19 @@ record: {every: ROWS}
 """
 """Rows on and inside steps, or inside nearly all of them; an input that steps inside one, contact
 lost and found again, and a range that is left for a while."""
+
+TOGGLE = """language: 1
+automaton: toggle
+step: 50 ms
+inputs: {u: {unit: "1"}}
+equations: {twice: 2 * u}
+initial: low
+modes:
+  low: {transitions: {high: {when: twice > 1}}}
+  high: {transitions: {low: {when: twice < 1, wait: 120 ms}}}
+outputs: [twice, mode]
+"""
+"""An automaton without states."""
 
 
 def run(folder: Path, rows: str) -> Trajectory:
@@ -69,3 +83,18 @@ def test_it_changes_no_bit_and_no_event(
     for name, values in cruised.signals.items():
         assert values.tobytes() == walked.signals[name].tobytes()
     assert np.isfinite(cruised.signals["plant.w_em"]).all()
+
+
+@pytest.mark.parametrize("rows", ["10 ms", "33 ms", "50 ms", "130 ms"])
+def test_an_automaton_without_states_has_rows_inside_its_steps(rows: str, tmp_path: Path) -> None:
+    scenario = "language: 1\nscenario: toggled\nof: toggle\nhorizon: 1 s\n"
+    scenario += "inputs: {u: {start: 0, steps: {0.31 s: 1, 0.5 s: 0}}}\n"
+    project_of(tmp_path, toggle=TOGGLE, toggled=scenario + f"record: {{every: {rows}}}\n")
+    found = mw.simulate("toggle", "toggled", root=tmp_path)
+    assert [(event.kind, event.time) for event in found.events] == [
+        ("transition", 0.31),
+        ("transition", 0.62),
+    ]
+    expected = np.where((found.times >= 0.31) & (found.times < 0.5), 2.0, 0.0)
+    assert found.signals["toggle.twice"].tolist() == expected.tolist()
+    assert len(found.times) == int(1000 / int(rows.split()[0])) + 1

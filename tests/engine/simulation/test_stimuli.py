@@ -152,3 +152,54 @@ def test_the_map_of_a_recording_is_given_by_its_name(tmp_path: Path) -> None:
     text = RUN.format(hold="linear", horizon="recording")
     project_of(tmp_path, cart=CART, run=text.replace("  file:", "  map: {time: t}\n  file:"))
     assert "`map` is a single value" in [problem.label for problem in mw.check("run", tmp_path)]
+
+
+STEEP = {
+    "ramp": "{start: 0, ramp: {from: 5 ms, to: 0.005000001 s, value: 1.0e+300}}",
+    "falling ramp": "{start: 1.7e+308, ramp: {from: 5 ms, to: 10 ms, value: 0}}",
+    "table": "{table: {0 s: 0, 5 ms: 1, 0.005000001 s: -1.0e+300}}",
+    "chirp": "{start: 0, chirp: {from: 0 s, to: 1.0e-9 s, amplitude: 1, "
+    "frequency: [0 Hz, 1.0e+300 Hz]}}",
+}
+"""Inputs with a slope that no float64 holds."""
+SHORT_RUN = "language: 1\nscenario: run\nof: cart\nhorizon: 20 ms\n"
+
+
+@pytest.mark.parametrize("form", STEEP)
+def test_an_input_steeper_than_a_number_is_refused(form: str, tmp_path: Path) -> None:
+    project_of(tmp_path, cart=CART, run=f"{SHORT_RUN}inputs: {{u: {STEEP[form]}}}\n")
+    (line,) = problem_lines(lambda: mw.simulate("cart", "run", root=tmp_path))
+    assert "than 1.8e+308" in line
+
+
+@pytest.mark.parametrize("back_end", ["interpreted", "compiled"])
+def test_a_recording_that_is_too_steep_stops_the_run(back_end: str, tmp_path: Path) -> None:
+    drive = "t,speed,way\n1000,3.6,5\n1005,3.6,5\n1005.000000001,3.6e300,6\n1100,0,7\n"
+    project_of(tmp_path, cart=CART, run=RUN.format(hold="linear", horizon="20 ms"))
+    (tmp_path / "spec" / "drive.csv").write_text(drive)
+    found = mw.simulate("cart", "run", root=tmp_path, compiled=back_end == "compiled")
+    assert found.stopped is not None
+    change = "input `u` changes from 1 to 1e+300 in 1e-12 s: float64 has no such slope"
+    assert change in found.stopped
+
+
+def test_a_slope_that_is_no_float32_stops_the_run(tmp_path: Path) -> None:
+    cart = CART.replace("step: 7 ms", "step: 7 ms\nnumbers: float32")
+    steep = "{start: 0, ramp: {from: 5 ms, to: 0.005000001 s, value: 1.0e+30}}"
+    project_of(tmp_path, cart=cart, run=f"{SHORT_RUN}inputs: {{u: {steep}}}\n")
+    found = mw.simulate("cart", "run", root=tmp_path)
+    assert found.stopped and "float32 has no such slope" in found.stopped
+
+
+@pytest.mark.parametrize("value", ["1.0e+290", "1.7e+305"])
+def test_a_ramp_as_steep_as_a_number_may_be_has_the_same_values_in_c(
+    value: str, tmp_path: Path
+) -> None:
+    steep = f"{{start: 0, ramp: {{from: 5 ms, to: 6 ms, value: {value}}}}}"
+    project_of(tmp_path, cart=CART, run=f"{SHORT_RUN}inputs: {{u: {steep}}}\n")
+    interpreted, compiled = (
+        mw.simulate("cart", "run", root=tmp_path, compiled=compiled) for compiled in (False, True)
+    )
+    assert interpreted.stopped is None
+    assert compiled.signals["cart.x"].tobytes() == interpreted.signals["cart.x"].tobytes()
+    assert interpreted.signals["cart.x"][-1] == pytest.approx(0.0145 * float(value), rel=1e-12)

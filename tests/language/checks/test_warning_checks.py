@@ -250,6 +250,71 @@ def test_flows_that_lead_back_at_once(
     assert kinds(tmp_path, text) == expected
 
 
+BOUNCING = """language: 1
+automaton: ball
+step: 10 ms
+states:
+  h: {{unit: m, initial: 1 m}}
+  v: {{unit: m/s, initial: 0 m/s}}
+discrete: {{k: {{initial: 0}}, loud: {{type: bool, initial: true}}}}
+initial: fly
+modes:
+  fly:
+    equations: {{left: 5 - k}}
+    flow: {{h: der(h) = v, v: der(v) = -9.81 m/s^2}}
+    transitions:
+      rest: {{{rest}}}
+      bounce: {{to: fly, {bounce}}}
+  rest:
+    flow: {{h: der(h) = 0 m/s, v: der(v) = 0 m/s^2}}
+    equations: {{left: 0}}
+outputs: [h, v, k, loud, mode]
+"""
+FALLING = "when: h <= 0 m and v < 0 m/s"
+SLOW = f"{FALLING} and v > -0.1 m/s"
+
+
+@pytest.mark.parametrize(
+    ("rest", "bounce", "is_zeno"),
+    [
+        (f"{SLOW}, priority: 1", f"{FALLING}, priority: 2", False),  # rest takes the point
+        (f"{SLOW} and h > -1 m, priority: 1", f"{FALLING}, priority: 2", True),  # only above -1 m
+        (f"{SLOW}, priority: 3", f"{FALLING}, priority: 2", True),
+        (f"{SLOW}, priority: 1, wait: 1 ms", f"{FALLING}, priority: 2", True),
+        (f"{SLOW}, priority: 1, wait: 0 s", f"{FALLING}, priority: 2", False),
+        ("when: v > -0.1 m/s and h <= 0 m, priority: 1", f"{FALLING}, priority: 2", False),
+        ("when: v > 0.1 m/s, priority: 1", f"{FALLING}, priority: 2", True),  # another point
+        ("when: v >= 0 m/s and h <= 0 m, priority: 1", f"{FALLING}, priority: 2", True),
+        ("when: rising(v > 0 m/s), priority: 1", f"{FALLING}, priority: 2", True),  # open
+        ("when: h > 5 m, priority: 1", f"{FALLING} and k < 5, priority: 2", False),  # five times
+        ("when: h > 5 m, priority: 1", f"{FALLING} and left > 0, priority: 2", False),
+        ("when: h > 5 m, priority: 1", f"{FALLING} and loud, priority: 2", False),  # once
+        ("when: h > 5 m, priority: 1", f"{FALLING} and k >= 0, priority: 2", False),
+    ],
+)
+def test_a_ball_that_comes_to_rest_bounces_finitely_often(
+    rest: str, bounce: str, is_zeno: bool, tmp_path: Path
+) -> None:
+    """A transition of a smaller priority or a counter ends the bounces."""
+    reset = "reset: {v: -0.8 * v, k: k + 1, loud: false}"
+    text = BOUNCING.format(rest=rest, bounce=f"{bounce}, {reset}")
+    found = kinds(tmp_path, text)
+    assert ("zeno" in found) == is_zeno and not {"name", "form", "type", "overflow"} & {*found}
+
+
+@pytest.mark.parametrize(
+    ("stick", "expected"),
+    [("v > -0.01 m/s and v < 0.01 m/s", []), ("v > 0.1 m/s", ["zeno"])],
+)
+def test_a_relay_with_a_sticking_mode_does_not_chatter(
+    stick: str, expected: list[str], tmp_path: Path
+) -> None:
+    stuck = f"when: v > 0 m/s, priority: 2}}, stuck: {{when: {stick}, priority: 1"
+    text = ZENO.format(force_a="1 N", force_b="-1 N", first=stuck, second="when: v < 0 m/s")
+    text = text.replace("outputs", "  stuck: {flow: {x: der(x) = v, v: m * der(v) = 0 N}}\noutputs")
+    assert kinds(tmp_path, text) == expected
+
+
 @pytest.mark.parametrize(("value", "expected"), [("5 m", ["past"]), ("2 m", [])])
 def test_a_constant_outside_of_the_range_of_its_target_is_reported(
     tmp_path: Path, value: str, expected: list[str]

@@ -244,7 +244,7 @@ def test_a_wait_of_a_continuous_automaton_has_no_ticks_but_a_timer() -> None:
 
 
 def test_the_longest_wait_fits_its_counter() -> None:
-    assert waiting(program(clock(wait=f"{MAX_WAIT_TICKS} ms"))).ticks == MAX_WAIT_TICKS == 2**16 - 2
+    assert waiting(program(clock(wait=f"{MAX_WAIT_TICKS} ms"))).ticks == MAX_WAIT_TICKS == 2**31 - 2
     (line,) = problem_lines(lambda: program(clock(wait=f"{MAX_WAIT_TICKS + 1} ms")))
     assert line.endswith(f"a wait of {MAX_WAIT_TICKS + 1} ticks is longer than {MAX_WAIT_TICKS}")
 
@@ -270,7 +270,7 @@ def test_a_tunable_wait_is_a_number_of_ticks_on_the_page() -> None:
     found = program(clock(parameters, wait="t_c"))
     (constant,) = (c for c in found.constants if c.kind == "tunable")
     assert (constant.name, constant.value, constant.type) == ("calibration.t_c", 30, "whole")
-    assert (constant.range, constant.unit) == ((10, 50), "tick")
+    assert (constant.range, constant.unit) == ((10, 51), "tick")
     assert (
         waiting(found).tunable_wait == "calibration.t_c" and waiting(found).timer_limit == 2**16 - 1
     )
@@ -279,17 +279,52 @@ def test_a_tunable_wait_is_a_number_of_ticks_on_the_page() -> None:
 @pytest.mark.parametrize(
     ("value", "limits", "label"),
     [
-        ("50.2 ms", "[10, 50.5]", "`t_c` is a wait of 51 ticks: within its range are 10 to 50"),
-        ("0.5 ms", "[0.1, 0.9]", "`t_c` is a wait: its range has no whole tick of 1/1000 s"),
-        ("0 ms", "[-0.5, 9]", "`t_c` is a wait: its range is within 0 to 65534 ticks"),
+        ("0 ms", "[-0.5, 9]", "`t_c` is a wait: its range is within 0 to 2147483646 ticks"),
+        ("5 ms", "[0, 2147484 s]", "`t_c` is a wait: its range is within 0 to 2147483646 ticks"),
+        ("51 ms", "[10, 50.5]", "the value of `t_c` is outside its range"),
     ],
 )
-def test_a_tunable_wait_has_whole_ticks_within_its_range(
-    value: str, limits: str, label: str
-) -> None:
+def test_a_tunable_wait_is_a_time_of_its_range(value: str, limits: str, label: str) -> None:
     parameters = f"  t_c: {{value: {value}, tunable: true, range: {limits}}}"
-    (problem,) = raised_problems(lambda: program(clock(parameters, wait="t_c")))
+    (problem, *_) = raised_problems(lambda: program(clock(parameters, wait="t_c")))
     assert problem.label == label
+
+
+@pytest.mark.parametrize(
+    ("value", "limits", "period", "ticks"),
+    [
+        ("5 s", "[0 s, 5 s]", "7 ms", (0, 715, 715)),
+        ("50.2 ms", "[10, 50.5]", "1 ms", (10, 51, 51)),
+        ("0.5 ms", "[0.1, 0.9]", "1 ms", (1, 1, 1)),
+        ("10 ms", "[10 ms, 1 s]", "3 ms", (4, 4, 334)),
+        ("1 h", "[30 min, 1 h]", "7 ms", (257143, 514286, 514286)),
+    ],
+)
+def test_a_tunable_wait_may_have_any_time_of_its_range(
+    value: str, limits: str, period: str, ticks: tuple[int, int, int]
+) -> None:
+    """Value and ends are rounded up to whole ticks alike, so the value is between the ends."""
+    parameters = f"  t_c: {{value: {value}, tunable: true, range: {limits}}}"
+    found = program(clock(parameters, wait="t_c", period=period))
+    (constant,) = (c for c in found.constants if c.kind == "tunable")
+    assert constant.range
+    assert (constant.range[0], constant.value, constant.range[1]) == ticks
+
+
+@pytest.mark.parametrize(
+    ("limits", "limit"),
+    [
+        ("", 2**31 - 1),
+        (", range: [0 s, 65534 ms]", 2**16 - 1),
+        (", range: [0 s, 65535 ms]", 2**31 - 1),
+        (", range: [0 s, 12 h]", 2**31 - 1),
+    ],
+)
+def test_the_counter_of_a_tunable_wait_counts_more_than_the_end_of_its_range(
+    limits: str, limit: int
+) -> None:
+    found = program(clock(f"  t_c: {{value: 1 ms, tunable: true{limits}}}", wait="t_c"))
+    assert waiting(found).timer_limit == limit
 
 
 def test_a_tunable_wait_of_a_continuous_automaton_is_none() -> None:
