@@ -87,6 +87,7 @@ def _side_data(trajectory: Trajectory) -> SideData:
         "events": [asdict(event) for event in trajectory.events],
         "stopped": trajectory.stopped,
         "faults": list(trajectory.faults),
+        "piecewise_constant": sorted(trajectory.piecewise_constant),
     }
 
 
@@ -126,6 +127,7 @@ def _build_trajectory(
         events=tuple(Event(**event) for event in side.get("events", ())),
         stopped=side.get("stopped"),
         faults=tuple(side.get("faults", ())),
+        piecewise_constant=frozenset(side.get("piecewise_constant", ())),
     )
 
 
@@ -136,7 +138,7 @@ def _fault_of(side: SideData, columns: Mapping[str, SignalArray]) -> str:
     """
     if not isinstance(side.get("name", ""), str):
         return "`name` is not a text"
-    for key in ("whole", "faults"):
+    for key in ("whole", "faults", "piecewise_constant"):
         if not _is_list_of_texts(side.get(key, [])):
             return f"`{key}` is not a list of texts"
     if not isinstance(side.get("stopped"), str | None):

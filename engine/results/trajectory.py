@@ -37,7 +37,8 @@ class Trajectory:
     `signals` are keyed `instance.output`; mode signals are integers, and `modes` gives their names.
     `stopped` is the reason why the run ended before the horizon, else None. `faults` are the
     latched fault bits as `instance: fault`; runs with a fault are excluded from accuracy
-    measurements (rule 18).
+    measurements (rule 18). `piecewise_constant` are the signals that change at single instants
+    only, such as the outputs of sampled automata.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Trajectory:
     events: tuple[Event, ...]
     stopped: str | None = None
     faults: tuple[str, ...] = ()
+    piecewise_constant: frozenset[str] = frozenset()
 
     def events_of(self, instance: str) -> tuple[Event, ...]:
         """Return the events of one instance, in the order of time.

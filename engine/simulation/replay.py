@@ -266,6 +266,7 @@ class _TickRecorder:
             units=self.units,
             modes=mode_names(self.program),
             events=tuple(self.events),
+            piecewise_constant=frozenset(wire.name for wire in self.program.outputs),
         )
 
 

@@ -329,6 +329,7 @@ class _Simulation:
             },
             events=tuple(self.events),
             stopped=stopped,
+            piecewise_constant=self.rows.piecewise_constant(),
             faults=tuple(
                 fault
                 for name, program in self.programs.items()
