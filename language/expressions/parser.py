@@ -21,6 +21,7 @@ from language.expressions.number_literal import (
 from language.expressions.parse_tree import parse_shape
 from language.expressions.syntax_tree import Name, Power, SyntaxTree, children, depth
 from language.expressions.tokens import KEYWORDS
+from language.expressions.units import unit_hint, unit_without_parentheses
 from language.text.diagnostic import Problems, Span, SpecError
 from language.text.document import ScalarNode
 
@@ -147,6 +148,10 @@ def _explain_syntax_error(
             return span.subspan(at, len(foreign)), label, f"it is written `{ours}`"
     if rest.startswith("="):
         return place, "`=` is not part of an expression", "equality is written `==`"
+    unit = re.match(r"1/\([^()]+\)", rest)
+    if unit and unit_without_parentheses(unit.group()):
+        label = f"`{unit.group()}` is not written as a unit"
+        return span.subspan(column - 1, len(unit.group())), label, unit_hint(unit.group())
     hint = "there is no implied multiplication" if re.match(r"[A-Za-z0-9(]", rest) else ""
     if re.match(r",\d", rest):
         hint = "a decimal point is a point: `12.5`"
