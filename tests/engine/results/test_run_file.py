@@ -38,6 +38,7 @@ def run(count: int = len(HARD)) -> Trajectory:
         stopped="`gap`, at 0.3 s",
         faults=("est: range",),
         piecewise_constant=frozenset({"plant.T_hs", "plant.mode"}),
+        fault_instants={"est: range": "t = 0.2 s, `est` in mode `gap`"},
     )
 
 
