@@ -19,9 +19,10 @@ UNUSED_HINT = "make it an output, or remove it"
 def check_unused(automaton: Automaton, problems: Problems) -> None:
     """Warn of parameters, inputs, states and equations without reader, and states without writer.
 
-    Events that no transition reacts to, and events that nothing raises, are reported, too. Outputs, events of transitions, observers and runs count as readers. Discrete variables are
-    states here; an equation is reported once. Parameters that an automaton has from its model are
-    left to the check of the model.
+    Events that no transition reacts to, and events that nothing raises, are reported, too. Outputs,
+    events of transitions, observers and runs count as readers. Discrete variables are states here;
+    an equation is reported once. Parameters that an automaton has from its model are left to the
+    check of the model.
     """
     model = automaton.model
     read = {*names_read_by(automaton), *map(automaton.output_source, automaton.outputs)}
