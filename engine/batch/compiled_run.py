@@ -118,6 +118,9 @@ class CompiledRun:
                 for column, place in columns
             },
             units={column.name: column.unit for column in self.recorded},
+            piecewise_constant=frozenset(
+                column.name for column in self.recorded if column.is_piecewise_constant
+            ),
             modes={
                 signal: names
                 for name, program in programs.items()

@@ -8,7 +8,12 @@ import numpy as np
 
 from engine.results.mode_band import ModeBand
 from engine.results.plot import Panel, Picture, PlotLine, axis_title, draw_picture
-from engine.results.run_comparison import RunDifference, SignalDifference, resample_signal
+from engine.results.run_comparison import (
+    RunDifference,
+    SignalDifference,
+    rename_instance,
+    resample_signal,
+)
 from engine.results.trajectory import Trajectory
 
 MAX_SIGNALS = 4
@@ -25,6 +30,7 @@ def draw_difference(
     A. Bands are those of mode signals that differ, or of all if none does. `labels` name the runs
     in the title.
     """
+    b = rename_instance(b, a)
     shown = _most_different(a, difference)
     times = a.times[(a.times >= difference.span[0]) & (a.times <= difference.span[1])]
     with np.errstate(invalid="ignore"):

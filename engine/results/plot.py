@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fnmatch
 import io
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -33,7 +34,10 @@ MAX_PEAK_RATIO = 6.0
 In the panel of the larger one it would look flat.
 """
 MAX_MARKERS = 200
-"""Largest number of mode changes marked in a panel; more lines would merge."""
+"""Largest number of mode changes marked in a panel; more lines would merge.
+
+Of more changes every second, third, ... is marked, and the legend says so.
+"""
 
 
 @dataclass(frozen=True)
@@ -106,8 +110,8 @@ def draw_picture(
     """Return a picture of bands and panels, one below the other, over a common axis of time [s].
 
     `span` is the shown time, without it that of all runs; an infinite end is that of the runs. The
-    windows `shaded` [s] are drawn red behind the panels. Dotted lines in each panel mark the first
-    `MAX_MARKERS` mode changes of the first run.
+    windows `shaded` [s] are drawn red behind the panels. Dotted lines in each panel mark the mode
+    changes of the first run, at most `MAX_MARKERS` of them.
     """
     heights = [0.28] * len(bands) + [panel.height for panel in panels] or [1.0]
     figure = Figure(figsize=(9.0, 1.2 + sum(heights)), layout="constrained")
@@ -266,13 +270,17 @@ def _time_window(
 def _draw_panel(
     axis: Axes, runs: Sequence[SampledRun], panel: Panel, window: tuple[float, float]
 ) -> None:
-    """Draw the curves of a panel within a window [s]; integer signals are drawn as steps."""
+    """Draw the curves of a panel within a window [s].
+
+    Integer signals and signals that are piecewise constant are drawn as steps.
+    """
     for k, line in enumerate(panel.lines):
         run = runs[line.run]
         shown = (run.times >= window[0]) & (run.times <= window[1])
         values = run.signals[line.signal]
         colour = PALETTE[(k if line.colour is None else line.colour) % len(PALETTE)]
-        style = "steps-post" if values.dtype == np.int64 else "default"
+        has_steps = values.dtype == np.int64 or line.signal in run.piecewise_constant
+        style = "steps-post" if has_steps else "default"
         axis.plot(
             run.times[shown], values[shown] * line.factor, "--" if line.dashed else "-",
             color=colour, lw=1.2, label=line.label, drawstyle=style,
@@ -283,12 +291,15 @@ def _draw_panel(
 
 
 def _mark_events(axis: Axes, run: SampledRun, window: tuple[float, float]) -> None:
-    """Mark the times of mode changes by dotted lines, at most `MAX_MARKERS`.
+    """Mark the times of mode changes by dotted lines, at most `MAX_MARKERS` over the whole window.
 
-    Events that leave the mode unchanged are not marked.
+    Of more changes every n-th is marked, and the legend states n and the number of changes. Events
+    that leave the mode unchanged are not marked.
     """
     times = {e.time for e in run.events if e.target not in ("", e.source)}
     instants = sorted(time for time in times if window[0] <= time <= window[1])
-    for k, time in enumerate(instants[:MAX_MARKERS]):
-        label = "mode changes" if k == 0 else None
+    stride = max(1, math.ceil(len(instants) / MAX_MARKERS))
+    text = "mode changes" if stride == 1 else f"mode changes, 1 of {stride} ({len(instants)})"
+    for k, time in enumerate(instants[::stride]):
+        label = text if k == 0 else None
         axis.axvline(time, color="black", lw=0.7, ls=":", alpha=0.55, label=label, zorder=0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -28,7 +29,8 @@ class RecordedColumn:
     """Recorded signal: name, type, unit, and its source.
 
     An expression is evaluated by the output block `block`; otherwise `source` is the signal to
-    read.
+    read. `is_piecewise_constant` is true if it changes at single instants only: for the outputs of
+    sampled automata, sensors with a period, and expressions of such signals.
     """
 
     name: str
@@ -36,6 +38,7 @@ class RecordedColumn:
     unit: str
     block: str | None
     source: str
+    is_piecewise_constant: bool = False
 
 
 def recorded_columns(
@@ -55,23 +58,28 @@ def recorded_columns(
     for owner, program in programs.items():
         for wire in program.outputs:
             name = f"{owner}.{wire.name}"
-            known[name] = RecordedColumn(name, wire.type, display_unit(wire.unit), None, name)
+            unit, is_sampled = display_unit(wire.unit), program.period is not None
+            known[name] = RecordedColumn(name, wire.type, unit, None, name, is_sampled)
             default_names.append(name)
     for name, sensor in system.sensors.items():
-        known[name] = RecordedColumn(name, "real", str(sensor.dimension), None, name)
+        is_sampled = sensor.period is not None
+        known[name] = RecordedColumn(name, "real", str(sensor.dimension), None, name, is_sampled)
         default_names.append(name)
     for name, output in system.outputs.items():
         if isinstance(output, Formula):
             dimension = system.dimensions.get(name)
             kind = "real" if dimension else "truth"
             block = output_block(name)
-            known[name] = RecordedColumn(name, kind, str(dimension or "1"), block, name)
+            is_constant = all(
+                read in known and known[read].is_piecewise_constant for read in output.reads
+            )
+            known[name] = RecordedColumn(
+                name, kind, str(dimension or "1"), block, name, is_constant
+            )
             default_names.append(name)
         else:
             part = known[output]
-            known[name] = RecordedColumn(
-                name, part.type, display_unit(part.unit), None, part.source
-            )
+            known[name] = dataclasses.replace(part, name=name, unit=display_unit(part.unit))
     return tuple(known[name] for name in scenario.signals or default_names)
 
 
@@ -124,6 +132,10 @@ class RowRecorder:
     def units(self) -> dict[str, str]:
         """Return the unit of each column by name."""
         return {column.name: column.unit for column in self.columns}
+
+    def piecewise_constant(self) -> frozenset[str]:
+        """Return the names of the columns that change at single instants only."""
+        return frozenset(column.name for column in self.columns if column.is_piecewise_constant)
 
     def seconds(self) -> NDArray[np.float64]:
         """Return the times of the rows [s] (n_rows,), rounded."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import fnmatch
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from engine.results.array_types import Reals
 from engine.results.sampled_run import SignalArray, matches_any
 from engine.results.trajectory import Trajectory
 from language.ir.root_region import CHART
+
+MAX_NAMES = 5
+"""Largest number of signals of a run that a message lists."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,8 @@ class RunDifference:
     """All differences of two runs over their common span [s].
 
     `only_a` and `only_b` are signals of one run; `uncovered` [s] is the time that only one run
-    covers.
+    covers. `renamed_instance` is the name of the only instance of run B if its signals are compared
+    with those of an instance of another name, such as the base of a variant; else "".
     """
 
     span: tuple[float, float]
@@ -73,6 +77,7 @@ class RunDifference:
     only_a: tuple[str, ...]
     only_b: tuple[str, ...]
     uncovered: float
+    renamed_instance: str = ""
 
     @property
     def is_within(self) -> bool:
@@ -108,6 +113,8 @@ def compare_runs(
 ) -> RunDifference:
     """Compare two runs at the samples of `a`; `b` is interpolated if it has other samples.
 
+    Signals are compared by name. Two runs of one instance each may have different names of the
+    instance (`rename_instance`), as the runs of an automaton and of its variant have.
     `patterns` (fnmatch) select signals, `span` [s] limits the time. A signal may differ by the
     larger of `relative` times its peak in `a` and its tolerances (patterns of names with values in
     SI); without both by nothing. Windows of different modes up to `slack` [s] are left out. Raises
@@ -115,6 +122,7 @@ def compare_runs(
     matches no common signal, and for one that is negative or not finite.
     """
     _require_tolerances({"relative": relative, "slack": slack, **(tolerances or {})})
+    original, b = b, rename_instance(b, a)
     names = [name for name in a.signals if matches_any(name, patterns)]
     common = [name for name in names if name in b.signals]
     times, uncovered = _common_times(a, b, span)
@@ -136,7 +144,40 @@ def compare_runs(
         only_a=tuple(name for name in names if name not in b.signals),
         only_b=tuple(n for n in b.signals if n not in a.signals and matches_any(n, patterns)),
         uncovered=uncovered,
+        renamed_instance="" if b is original else next(iter(_instances(original))),
     )
+
+
+def rename_instance(run: Trajectory, other: Trajectory) -> Trajectory:
+    """Return a run with its only instance under the name of the only instance of another run.
+
+    The run is returned as it is if one of them has no instance or several, and if no signal is in
+    both runs afterwards.
+    """
+    old, new = _instances(run), _instances(other)
+    if len(old) != 1 or len(new) != 1 or old == new:
+        return run
+    (before,), (after,) = old, new
+
+    def rename(name: str) -> str:
+        """Return the name of a signal with the new name of the instance."""
+        return f"{after}.{name.removeprefix(before + '.')}" if "." in name else name
+
+    if not any(rename(name) in other.signals for name in run.signals):
+        return run
+    return replace(
+        run,
+        signals={rename(name): values for name, values in run.signals.items()},
+        units={rename(name): unit for name, unit in run.units.items()},
+        modes={rename(name): modes for name, modes in run.modes.items()},
+        events=tuple(replace(event, instance=after) for event in run.events),
+        piecewise_constant=frozenset(map(rename, run.piecewise_constant)),
+    )
+
+
+def _instances(run: Trajectory) -> set[str]:
+    """Return the names of the instances whose signals a run has."""
+    return {name.partition(".")[0] for name in run.signals if "." in name}
 
 
 def resample_signal(trajectory: Trajectory, name: str, times: Reals) -> Reals:
@@ -195,7 +236,9 @@ def _require_comparable(
     The reasons are no common signal, different units, and a tolerance that matches no signal.
     """
     if not common:
-        raise ValueError("the runs have no signal in common")
+        names = (", ".join(list(run.signals)[:MAX_NAMES]) or "none" for run in (a, b))
+        text = "the runs have no signal in common: the signals of A are {}; those of B are {}"
+        raise ValueError(text.format(*names))
     for name in common:
         if a.units[name] != b.units[name]:
             raise ValueError(f"`{name}` is in `{a.units[name]}` and in `{b.units[name]}`")

@@ -88,6 +88,8 @@ def _side_data(trajectory: Trajectory) -> SideData:
         "events": [asdict(event) for event in trajectory.events],
         "stopped": trajectory.stopped,
         "faults": list(trajectory.faults),
+        "piecewise_constant": sorted(trajectory.piecewise_constant),
+        "fault_instants": dict(trajectory.fault_instants),
     }
 
 
@@ -127,6 +129,8 @@ def _build_trajectory(
         events=tuple(Event(**event) for event in side.get("events", ())),
         stopped=side.get("stopped"),
         faults=tuple(side.get("faults", ())),
+        piecewise_constant=frozenset(side.get("piecewise_constant", ())),
+        fault_instants=side.get("fault_instants", {}),
     )
 
 
@@ -137,11 +141,14 @@ def _fault_of(side: SideData, columns: Mapping[str, SignalArray]) -> str:
     """
     if not isinstance(side.get("name", ""), str):
         return "`name` is not a text"
-    for key in ("whole", "faults"):
+    for key in ("whole", "faults", "piecewise_constant"):
         if not _is_list_of_texts(side.get(key, [])):
             return f"`{key}` is not a list of texts"
     if not isinstance(side.get("stopped"), str | None):
         return "`stopped` is neither a text nor null"
+    instants = side.get("fault_instants", {})
+    if not isinstance(instants, dict) or not _is_list_of_texts([*instants.values()]):
+        return "`fault_instants` is not a mapping of texts"
     modes, events = side.get("modes", {}), side.get("events", [])
     if not isinstance(modes, dict):
         return "`modes` is not a mapping"

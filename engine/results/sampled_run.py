@@ -63,6 +63,10 @@ class SampledRun(Protocol):
     def events(self) -> tuple[Event, ...]:
         """Transitions and violations, in the order of time."""
 
+    @property
+    def piecewise_constant(self) -> frozenset[str]:
+        """Signals that change at single instants only."""
+
 
 def matches_any(name: str, patterns: Sequence[str]) -> bool:
     """Return whether a name matches one of the patterns of fnmatch; True without patterns."""

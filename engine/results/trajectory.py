@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,7 +37,9 @@ class Trajectory:
     `signals` are keyed `instance.output`; mode signals are integers, and `modes` gives their names.
     `stopped` is the reason why the run ended before the horizon, else None. `faults` are the
     latched fault bits as `instance: fault`; runs with a fault are excluded from accuracy
-    measurements (rule 18).
+    measurements (rule 18). `piecewise_constant` are the signals that change at single instants
+    only, such as the outputs of sampled automata. `fault_instants` gives the time and the mode at
+    which each of `faults` was set first, as a text; a compiled run does not record them.
     """
 
     name: str
@@ -48,6 +50,8 @@ class Trajectory:
     events: tuple[Event, ...]
     stopped: str | None = None
     faults: tuple[str, ...] = ()
+    piecewise_constant: frozenset[str] = frozenset()
+    fault_instants: Mapping[str, str] = field(default_factory=dict)
 
     def events_of(self, instance: str) -> tuple[Event, ...]:
         """Return the events of one instance, in the order of time.

@@ -274,6 +274,7 @@ class _TickRecorder:
             units=self.units,
             modes=mode_names(self.program),
             events=tuple(self.events),
+            piecewise_constant=frozenset(wire.name for wire in self.program.outputs),
         )
 
 

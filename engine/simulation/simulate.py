@@ -84,6 +84,7 @@ class _Simulation:
             for name, program in self.programs.items()
         }
         self.fault_words: dict[str, int] = {}
+        self.fault_instants: dict[str, str] = {}
         self.environments: dict[str, SystemEnvironment] = {}
         self.flows: dict[str, ContinuousRun] = {}
         for name, program in self.programs.items():
@@ -289,10 +290,13 @@ class _Simulation:
     def _report_range_violations(self, name: str, time: Fraction) -> None:
         """Accumulate the fault bits and record an event for each newly saturated signal (rule 18).
 
-        A signal is reported once in a run, with its time and mode.
+        A fault bit and a signal are reported once in a run, with the time and the mode.
         """
         stepper, program = self.steppers[name], self.programs[name]
-        self.fault_words[name] = self.fault_words.get(name, 0) | stepper.get("memory.faults")
+        known, word = self.fault_words.get(name, 0), stepper.get("memory.faults")
+        self.fault_words[name] = known | word
+        for fault in fault_names(name, program, word & ~known):
+            self.fault_instants[fault] = describe_instant(name, program, stepper, time)
         for signal in stepper.pop_range_violations():
             if (name, signal) not in self.reported_ranges:
                 self.reported_ranges.add((name, signal))
@@ -329,6 +333,8 @@ class _Simulation:
             },
             events=tuple(self.events),
             stopped=stopped,
+            piecewise_constant=self.rows.piecewise_constant(),
+            fault_instants=self.fault_instants,
             faults=tuple(
                 fault
                 for name, program in self.programs.items()

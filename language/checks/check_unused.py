@@ -1,10 +1,14 @@
-"""Check for unused names: warns of names that nothing reads and of states that nothing writes."""
+"""Check for unused names: warns of names that nothing reads and of states that nothing writes.
+
+An event is read by the transitions with `event` and written by those with `raise`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 from language.model.automaton import Automaton, Mode
+from language.model.transition_precedence import possible_events
 from language.model.used_names import names_read_by
 from language.text.diagnostic import Problems, suggest_name
 
@@ -15,9 +19,10 @@ UNUSED_HINT = "make it an output, or remove it"
 def check_unused(automaton: Automaton, problems: Problems) -> None:
     """Warn of parameters, inputs, states and equations without reader, and states without writer.
 
-    Outputs, events of transitions, observers and runs count as readers. Discrete variables are
-    states here; an equation is reported once. Parameters that an automaton has from its model are
-    left to the check of the model.
+    Events that no transition reacts to, and events that nothing raises, are reported, too. Outputs,
+    events of transitions, observers and runs count as readers. Discrete variables are states here;
+    an equation is reported once. Parameters that an automaton has from its model are left to the
+    check of the model.
     """
     model = automaton.model
     read = {*names_read_by(automaton), *map(automaton.output_source, automaton.outputs)}
@@ -40,6 +45,35 @@ def check_unused(automaton: Automaton, problems: Problems) -> None:
             problems.warning("unused", state.span, f"state `{name}` is read nowhere", UNUSED_HINT)
     _check_equations(automaton, read, problems)
     _check_unwritten(automaton, problems)
+    _check_events(automaton, problems)
+
+
+def _check_events(automaton: Automaton, problems: Problems) -> None:
+    """Warn of events of a chart that no transition reacts to, and of events that nothing raises.
+
+    An input event is raised by its input; if no transition reacts to it, its input is reported. An
+    event that nothing raises is left to the check of dead transitions if a transition reacts to
+    such events only.
+    """
+    transitions = [each for mode in automaton.all_modes for each in mode.transitions]
+    possible = possible_events(automaton)
+    heard = {name for transition in transitions for name in transition.events}
+    dead = [each for each in transitions if not possible & {*each.events}]
+    reported = {name for transition in dead for name in transition.events}
+    for event in automaton.statechart.events.values() if automaton.statechart else ():
+        name = event.name
+        if event.is_input or name in (possible & heard) or name in reported:
+            continue
+        if name in heard:
+            hint = f"write `raise: {name}` on a transition, or declare it with `from: input`"
+            problems.warning("unwritten", event.span, f"event `{name}` is never raised", hint)
+        elif name in possible:
+            label = f"event `{name}` is raised, but no transition has `event: {name}`"
+            hint = f"write `event: {name}` on a transition, or remove the event"
+            problems.warning("unused", event.span, label, hint)
+        else:
+            label = f"event `{name}` is never raised, and no transition has `event: {name}`"
+            problems.warning("unused", event.span, label, "remove the event")
 
 
 def _check_equations(automaton: Automaton, read: set[str], problems: Problems) -> None:

@@ -52,6 +52,10 @@ KEY_HINTS: Mapping[str, str] = {
 """Keys that users write inside a mode, each with the help text for it."""
 ASSIGNMENT_PATTERN = re.compile(r"([A-Za-z]\w*)\s*=\s*([^=;,]+)")
 INCREMENT_PATTERN = re.compile(r"([A-Za-z]\w*)?\s*(\+\+|--|[-+*/]=)")
+DECLARATION_KEY_PATTERN = re.compile(
+    r"(inputs|parameters|states|discrete)\.(unit|range|value|initial|default|type|tunable|values)"
+)
+"""Path of a key of a declaration that stands beside the declarations."""
 EVENT_WITH_GUARD_PATTERN = re.compile(r"(\w+)\s*\[(.*)\]")
 FUNCTION_HINTS: Mapping[str, str] = {
     "duration": "write `wait: 5 s` on the transition: how long its guard has to hold",
@@ -65,7 +69,18 @@ FUNCTION_HINTS: Mapping[str, str] = {
     "log10": "`log(x) / log(10)`",
     "log2": "`log(x) / log(2)`",
     "power": "`x^2` for a whole power, else `pow(x, 2.5)`",
-    "atan": "`atan2(y, x)`: of a number x it is `atan2(x, 1)`",
+    **dict.fromkeys(("atan", "arctan"), "`atan2(y, x)`: of a number x it is `atan2(x, 1)`"),
+    **dict.fromkeys(("asin", "arcsin"), "of a number x it is `atan2(x, sqrt(1 - x^2))`"),
+    **dict.fromkeys(("acos", "arccos"), "of a number x it is `atan2(sqrt(1 - x^2), x)`"),
+    "sinh": "`(exp(x) - exp(-x)) / 2`",
+    "cosh": "`(exp(x) + exp(-x)) / 2`",
+    "hypot": "`sqrt(x^2 + y^2)`",
+    "ceil": "`-floor(-x)`",
+    "round": "`floor(x + 0.5)`",
+    **dict.fromkeys(("mod", "fmod", "rem"), "`x - m * floor(x / m)`"),
+    **dict.fromkeys(("saturate", "sat", "limit", "clamp"), "`clip(x, low, high)`"),
+    **dict.fromkeys(("sgn", "signum"), "`sign(x)`"),
+    "fabs": "`abs(x)`",
     "send": "events are raised by a transition: `raise: name`",
 }
 """Functions of other tools, each with the help text for it."""
@@ -103,10 +118,14 @@ def key_hint(key: str, what: str) -> str:
 def mapping_hint(node: YamlNode, what: str) -> str:
     """Return the help text for a text or list where a mapping is needed; empty if none is known.
 
-    If `what`, the key path, ends with `transitions` or a name below it, the text is an example of a
-    transition. Else assignments like `k = 1` in the text, or in the items of the list, are shown as
-    a mapping: "it is written `{k: 1}`".
+    A key like `inputs.range` gets the help text to indent it. If `what`, the key path, ends with
+    `transitions` or a name below it, the text is an example of a transition. Else assignments like
+    `k = 1` in the text, or in the items of the list, are shown as a mapping: "it is written
+    `{k: 1}`".
     """
+    if DECLARATION_KEY_PATTERN.fullmatch(what):
+        section, _, key = what.partition(".")
+        return f"`{key}` is a key of one of the `{section}`: indent it below its name"
     if what.endswith("transitions"):
         return "each has a name: `transitions: {fault: {to: fault, when: ...}}`"
     if re.search(r"transitions\.\w+$", what):

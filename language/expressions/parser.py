@@ -19,8 +19,9 @@ from language.expressions.number_literal import (
     parse_quantity_literal,
 )
 from language.expressions.parse_tree import parse_shape
-from language.expressions.syntax_tree import Name, SyntaxTree, depth
+from language.expressions.syntax_tree import Name, Power, SyntaxTree, children, depth
 from language.expressions.tokens import KEYWORDS
+from language.expressions.units import unit_hint, unit_without_parentheses
 from language.text.diagnostic import Problems, Span, SpecError
 from language.text.document import ScalarNode
 
@@ -32,14 +33,20 @@ MAX_EXPRESSION_LENGTH = 2000
 """Longest expression that is parsed [characters]."""
 MAX_DEPTH = 100
 """Largest depth of a tree; a sum of 100 terms has it."""
+MAX_EXPANDED_SIZE = 10_000
+"""Largest number of operands and operations after each power is written as multiplications.
+
+An expression of MAX_EXPRESSION_LENGTH without nested powers stays below it.
+"""
 
 
 def parse_expression(scalar: ScalarNode) -> SyntaxTree:
     """Return the tree of an expression.
 
     Raises SpecError, with the place inside the text, for a text that is not an expression, is
-    longer than MAX_EXPRESSION_LENGTH, has a line break or gives a tree deeper than MAX_DEPTH, and
-    for a number, unit or exponent that is not valid. Names and types are not checked.
+    longer than MAX_EXPRESSION_LENGTH, has a line break, gives a tree deeper than MAX_DEPTH or
+    expands to more than MAX_EXPANDED_SIZE parts, and for a number, unit or exponent that is not
+    valid. Names and types are not checked.
     """
     (tree,) = _parse(scalar, "expression")
     return tree
@@ -69,14 +76,28 @@ def _parse(scalar: ScalarNode, start_rule: str) -> tuple[SyntaxTree, ...]:
     try:
         shape = parse_shape(text, start_rule)
         trees = build_trees(shape, span)
-        if shape.depth <= MAX_DEPTH or all(depth(tree) <= MAX_DEPTH for tree in trees):
+        if shape.depth > MAX_DEPTH and any(depth(tree) > MAX_DEPTH for tree in trees):
+            problems.error("expression", span, "the expression is nested too deeply")
+        elif "^" in text and any(_expanded_size(tree) > MAX_EXPANDED_SIZE for tree in trees):
+            label = f"the powers in this expression have more than {MAX_EXPANDED_SIZE} factors"
+            problems.error("power", span, label, "write an equation for the inner power")
+        else:
             return trees
-        problems.error("expression", span, "the expression is nested too deeply")
     except lark.exceptions.UnexpectedInput as error:
         problems.error("expression", *_explain_syntax_error(text, span, start_rule, error))
     except RecursionError:
         problems.error("expression", span, "the expression is nested too deeply")
     raise SpecError(problems.reported)
+
+
+def _expanded_size(tree: SyntaxTree) -> int:
+    """Return the number of parts of a tree if `x^n` is counted as n factors.
+
+    A nested power such as `(x^2)^2` repeats its base; the number grows by the product of all
+    exponents.
+    """
+    size = 1 + sum(_expanded_size(part) for part in children(tree))
+    return size * max(abs(tree.exponent), 1) if isinstance(tree, Power) else size
 
 
 def _parse_simple(text: str, span: Span) -> SyntaxTree | None:
@@ -127,6 +148,10 @@ def _explain_syntax_error(
             return span.subspan(at, len(foreign)), label, f"it is written `{ours}`"
     if rest.startswith("="):
         return place, "`=` is not part of an expression", "equality is written `==`"
+    unit = re.match(r"1/\([^()]+\)", rest)
+    if unit and unit_without_parentheses(unit.group()):
+        label = f"`{unit.group()}` is not written as a unit"
+        return span.subspan(column - 1, len(unit.group())), label, unit_hint(unit.group())
     hint = "there is no implied multiplication" if re.match(r"[A-Za-z0-9(]", rest) else ""
     if re.match(r",\d", rest):
         hint = "a decimal point is a point: `12.5`"

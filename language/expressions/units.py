@@ -240,6 +240,8 @@ def unit_hint(text: str) -> str:
     to it, and the result is suggested if it is a unit. Else a text with a blank gives examples of
     units.
     """
+    if written := unit_without_parentheses(text):
+        return f"a unit has no parentheses: write `{written}`"
     if text in MISSPELLED_UNITS:
         return f"did you mean `{MISSPELLED_UNITS[text]}`?"
     changed = re.sub(r"[A-Za-z]+", lambda match: _nearest_symbol(match.group()), text)
@@ -247,6 +249,22 @@ def unit_hint(text: str) -> str:
         return f"did you mean `{parse_unit(changed).text}`?"
     except UnitError:
         return "a unit is written like `N*m`, `kg*m^2`, `1/s`" if " " in text else ""
+
+
+def unit_without_parentheses(text: str) -> str:
+    """Return a unit with its parentheses resolved: `1/(kg*m^2) -> 1/kg/m^2`; else "".
+
+    A divisor in parentheses has its `*` and `/` exchanged. The result is "" for a text without
+    parentheses, with nested ones, or that is no unit afterwards.
+    """
+    flipped = str.maketrans("*/", "/*")
+    written = re.sub(r"/\(([^()]+)\)", lambda match: f"/{match[1].translate(flipped)}", text)
+    written = re.sub(r"(^|\*)\(([^()]+)\)", r"\1\2", written)
+    try:
+        parse_unit(written)
+    except UnitError:
+        return ""
+    return written if written != text else ""
 
 
 def matching_units_hint(dimension: Dimension) -> str:

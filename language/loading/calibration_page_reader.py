@@ -110,11 +110,8 @@ class _PageReader(StimulusReader):
     def _read_tunable(self, entry: Entry, parameter: Parameter) -> Fraction:
         """Return a value in SI; one outside the range of the parameter is reported."""
         value, _ = self.read_quantity(entry.node, entry.key, entry.span, parameter.unit)
-        limits = parameter.range
-        if limits and not limits[0] <= value <= limits[1]:
-            place = entry.node.span
-            label = f"the value of `{parameter.name}` is outside its range"
-            self.problems.error("range", place, label)
+        unit, place = parameter.unit, entry.node.span
+        self.check_value_in_range(parameter.name, value, parameter.range, unit, place)
         return value
 
 

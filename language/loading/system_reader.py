@@ -246,11 +246,13 @@ class _SystemReader(Reader):
             owner = sensor.source.partition(".")[0]
             if not sensor.delay and owner in instances:
                 edges[owner].append(sensor.name)
+        pairs: set[frozenset[str]] = set()
         for connection in connections.values():
             target = instances[connection.target[0]]
+            if not target.automaton.is_sampled:
+                self._check_continuous_target(wires, connection, target, pairs)
             for read in connection.reads:
                 owner = read.partition(".")[0] if read not in wires.delayed_signals else ""
-                self._check_continuous_read(wires, read, target, connection)
                 if owner in edges and target.automaton.is_sampled:
                     edges[owner].append(target.name)
         order = topological_sort(edges)
@@ -262,29 +264,39 @@ class _SystemReader(Reader):
             self.problems.error("loop", span, label, hint)
         return tuple(order or instances)
 
-    def _check_continuous_read(
-        self, wires: ConnectionReader, read: str, target: Instance, at: Connection
+    def _check_continuous_target(
+        self,
+        wires: ConnectionReader,
+        connection: Connection,
+        target: Instance,
+        pairs: set[frozenset[str]],
     ) -> None:
-        """Report signals that a continuous automaton cannot read inside its integration.
+        """Report what a connection to a continuous automaton reads although it cannot.
 
-        These are sensors without `sample` and outputs of another continuous automaton.
+        These are sensors without `sample` and outputs of a continuous automaton. A pair of
+        automata is reported once, for all its connections in both directions; `pairs` has the pairs
+        that were reported and is changed. An own output of the target is reported if the connection
+        reads no other continuous automaton.
         """
-        if target.automaton.is_sampled:
-            return
-        sensor = wires.sensors.get(read)
-        if sensor and sensor.period is None:
-            label = (
-                f"`{target.name}` is continuous and reads sensor `{read}`, which has no `sample`"
-            )
-            self.problems.error("connection", at.span, label, "like `sample: 1 ms`")
-        source = wires.delayed_signals[read].source if read in wires.delayed_signals else read
-        owner = wires.instances.get(source.partition(".")[0])
-        if owner and "." in source:
-            self._report_both_continuous(owner, target, at)
-
-    def _report_both_continuous(self, owner: Instance, target: Instance, at: Connection) -> None:
-        """Report a connection between two continuous automata."""
-        if not owner.automaton.is_sampled and not target.automaton.is_sampled:
-            label = f"`{owner.name}` and `{target.name}` are both continuous"
+        owners: dict[str, str] = {}
+        for read in connection.reads:
+            sensor = wires.sensors.get(read)
+            if sensor and sensor.period is None:
+                label = f"`{target.name}` is continuous and reads sensor `{read}`, "
+                label += "which has no `sample`"
+                self.problems.error("connection", connection.span, label, "like `sample: 1 ms`")
+            source = wires.delayed_signals[read].source if read in wires.delayed_signals else read
+            owner = wires.instances.get(source.partition(".")[0])
+            if owner and "." in source and not owner.automaton.is_sampled:
+                owners.setdefault(owner.name, source)
+        for name, source in owners.items():
+            pair = frozenset((name, target.name))
+            if pair in pairs or (name == target.name and len(owners) > 1):
+                continue
+            pairs.add(pair)
+            label = f"`{name}` and `{target.name}` are both continuous"
             hint = "this version connects a continuous automaton to sampled ones only"
-            self.problems.error("connection", at.span, label, hint)
+            if name == target.name:
+                label = f"`{name}` is continuous and reads its own output `{source}`"
+                hint = f"write the term in the automaton of `{name}`"
+            self.problems.error("connection", connection.span, label, hint)

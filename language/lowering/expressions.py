@@ -129,26 +129,20 @@ def _lower_application(tree: FunctionCall, known: NameBindings) -> Expr:
         case FunctionCall(function, _, _) if function in MEMORY_FUNCTIONS:
             return known[memory_key(tree)]
         case FunctionCall(function, arguments, _):
-            wholes = (
-                _lower_whole_arguments(arguments, known)
-                if function in SAME_UNIT_FUNCTIONS
-                else None
-            )
-            if wholes:
-                return lower_integer_call(function, wholes)
-            return Call(function, tuple(_lower_real(part, known) for part in arguments))
+            lowered = [_lower_typed(argument, known) for argument in arguments]
+            are_whole = [whole for _, whole in lowered]
+            if function in SAME_UNIT_FUNCTIONS and is_integer_call(arguments, are_whole):
+                return lower_integer_call(function, _to_whole_arguments(arguments, lowered))
+            return Call(function, tuple(_convert_to_real(expr, whole) for expr, whole in lowered))
 
 
-def _lower_whole_arguments(
-    arguments: Sequence[SyntaxTree], known: NameBindings
-) -> list[Expr] | None:
-    """Return the arguments as whole numbers; None if the call is not one of whole numbers.
+def _to_whole_arguments(
+    arguments: Sequence[SyntaxTree], lowered: Sequence[tuple[Expr, bool]]
+) -> list[Expr]:
+    """Return the arguments of a call of whole numbers; a literal like `2` becomes a whole number.
 
-    A literal like `2` counts as a whole number if another argument is one.
+    `lowered` has the expression of each argument, and whether its value is a whole number.
     """
-    lowered = [_lower_typed(argument, known) for argument in arguments]
-    if not is_integer_call(arguments, [whole for _, whole in lowered]):
-        return None
     pairs = zip(arguments, lowered, strict=True)
     return [expr if whole else Value(integer_literal(tree) or 0) for tree, (expr, whole) in pairs]
 
@@ -198,8 +192,12 @@ def is_whole(expr: Expr) -> bool:
 
 def _lower_real(tree: SyntaxTree, known: NameBindings) -> Expr:
     """Return the Program's expression of a tree, converted to a real if it is a whole number."""
-    value, whole = _lower_typed(tree, known)
-    return Call("real", (value,)) if whole else value
+    return _convert_to_real(*_lower_typed(tree, known))
+
+
+def _convert_to_real(expr: Expr, whole: bool) -> Expr:
+    """Return the call `real` of an expression if its value is a whole number, else the same."""
+    return Call("real", (expr,)) if whole else expr
 
 
 def _lower_operands(

@@ -9,9 +9,11 @@ the active one. Selection and entry follow W3C SCXML (2015, appendix D), whose t
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
+
+from language.text.diagnostic import Span
 
 NodeKind = Literal["atomic", "compound", "parallel", "history"]
 HistoryKind = Literal["", "shallow", "deep"]
@@ -55,11 +57,12 @@ class ChartNode:
 
 @dataclass(frozen=True)
 class ChartEvent:
-    """An event: its number in the queue, and whether it is raised by an input."""
+    """An event: its number in the queue, whether an input raises it, and its place in the spec."""
 
     name: str
     number: int
     is_input: bool
+    span: Span = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True)

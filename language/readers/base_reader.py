@@ -235,6 +235,21 @@ class Reader:
             self.problems.error("range", node.span, f"`{what}` is a time, like `15 ms`")
         return value
 
+    def check_value_in_range(
+        self, name: str, value: Fraction, limits: Range | None, unit: Unit, span: Span
+    ) -> None:
+        """Report a value of a parameter outside its range; both are in SI, the help is in `unit`.
+
+        Without `limits` nothing is reported.
+        """
+        if limits and not limits[0] <= value <= limits[1]:
+            low, high = ((bound - unit.offset) / unit.factor for bound in limits)
+            hint = f"the range is {float(low):.9g} to {float(high):.9g} {unit.text}".removesuffix(
+                " 1"
+            )
+            label = f"the value of `{name}` is outside its range"
+            self.problems.error("range", span, label, hint)
+
     def read_unit(self, node: YamlNode | None) -> Unit:
         """Return a unit; `NO_UNIT` (1) if the node is absent, an empty text or no scalar.
 

@@ -317,7 +317,8 @@ class ChartReader:
         for entry in self.mode_reader.named_entries(self.root.get("events"), "events"):
             table = self.mode_reader.read_mapping(entry.node, f"events.{entry.key}", ("from",))
             origin = self.mode_reader.read_choice(table.get("from"), "from", ("input",), "")
-            events[entry.key] = ChartEvent(entry.key, len(events) + 1, origin == "input")
+            number = len(events) + 1
+            events[entry.key] = ChartEvent(entry.key, number, origin == "input", entry.span)
         return events
 
     def _read_order(self) -> str:

@@ -74,9 +74,8 @@ class ParameterReader(Reader):
         if unit is UNKNOWN_UNIT:
             limits = None  # reported as an unknown unit
         value_node = table.get("value")
-        if limits and value is not None and value_node and not limits[0] <= value <= limits[1]:
-            label = f"the value of `{entry.key}` is outside its range"
-            self.problems.error("range", value_node.span, label)
+        if value is not None and value_node:
+            self.check_value_in_range(entry.key, value, limits, unit, value_node.span)
         if type_ == "int":
             limits = self.check_integer_range(limits, table.get("range"))
         if "scale" in table.entries:

@@ -37,7 +37,9 @@ class UnknownRateError(Exception):
 class LieDerivative:
     """Derivatives along the flow of the mode of a snapshot.
 
-    Assignments that they need are appended to the symbolic path of the snapshot.
+    Assignments that they need are appended to the symbolic path of the snapshot. Each operation of
+    a differentiated expression is assigned to a name of its own, and so is each rate. The rules
+    repeat operands, so the derivative of nested operations has 2^depth parts without the names.
     """
 
     def __init__(self, snapshot: GuardSnapshot) -> None:
@@ -48,6 +50,8 @@ class LieDerivative:
         self.snapshot = snapshot
         self.assignments = snapshot.path.assignments
         self.rates: dict[str, Expr] = {}
+        self.operations: dict[Expr, Ref] = {}
+        self.values: dict[str, Expr] = {}
         mode = snapshot.mode
         for state in snapshot.automaton.states:
             if state not in mode.flow:
@@ -65,36 +69,76 @@ class LieDerivative:
             self.rates[known.name] = Ref(target)
 
     def differentiate(self, expr: Expr) -> Expr:
-        """Return the derivative of an expression with respect to time.
+        """Return the derivative of an expression with respect to time: 0 or a name.
 
         Inputs, parameters and discrete variables are constant. At a corner of `abs`, `min`, `max`,
-        `clip` or a selection it is that of the active branch; `sign` and `floor` have 0. Rates of
-        assigned names are appended to the path. Raises UnknownRateError for memory, conditions and
-        functions without a rule (such as lookups), unless their arguments are constant.
+        `clip` or a selection it is that of the active branch; `sign` and `floor` have 0. The
+        operations of the expression and their rates are appended to the path. Raises
+        UnknownRateError for memory, conditions and functions without a rule (such as lookups),
+        unless their arguments are constant.
         """
+        return self._rate_of_operation(self._assign_operations(expr))
+
+    def _assign_operations(self, expr: Expr) -> Expr:
+        """Return the name of an expression; its operations are assigned first, inner ones before.
+
+        Equal operations share a name. Literals, names and elements of arrays are returned as they
+        are.
+        """
+        match expr:
+            case Unary(operator, operand):
+                operation: Expr = Unary(operator, self._assign_operations(operand))
+            case Binary(operator, left, right):
+                operation = Binary(
+                    operator, self._assign_operations(left), self._assign_operations(right)
+                )
+            case Compare(relation, left, right):
+                operation = Compare(
+                    relation, self._assign_operations(left), self._assign_operations(right)
+                )
+            case Select(condition, then, other):
+                parts = [self._assign_operations(part) for part in (condition, then, other)]
+                operation = Select(*parts)
+            case Call(function, arguments):
+                operation = Call(function, tuple(map(self._assign_operations, arguments)))
+            case _:
+                return expr
+        if operation not in self.operations:
+            name = Ref(f"operation {len(self.operations)}{self.snapshot.suffix}")
+            self.operations[operation] = name
+            self.values[name.name] = operation
+            self.assignments.append((name.name, operation))
+        return self.operations[operation]
+
+    def _rate_of_operation(self, expr: Expr) -> Expr:
+        """Return the rate of an operation from the rates of its operands, which are names."""
         match expr:
             case Value():
                 return ZERO
             case Ref(name):
                 return self._rate_of_name(name)
             case Unary("-", operand):
-                return _negate(self.differentiate(operand))
+                return _negate(self._rate_of_operation(operand))
             case Binary("+", left, right):
-                return _add_rates(self.differentiate(left), self.differentiate(right))
+                return _add_rates(self._rate_of_operation(left), self._rate_of_operation(right))
             case Binary("-", left, right):
-                return _add_rates(self.differentiate(left), _negate(self.differentiate(right)))
+                return _add_rates(
+                    self._rate_of_operation(left), _negate(self._rate_of_operation(right))
+                )
             case Binary("*", left, right):
                 return _add_rates(
-                    _multiply_rate(self.differentiate(left), right),
-                    _multiply_rate(left, self.differentiate(right)),
+                    _multiply_rate(self._rate_of_operation(left), right),
+                    _multiply_rate(left, self._rate_of_operation(right)),
                 )
             case Binary("/", left, right):
-                first, second = self.differentiate(left), self.differentiate(right)
+                first, second = self._rate_of_operation(left), self._rate_of_operation(right)
                 if second == ZERO:
                     return first if first == ZERO else divide(first, right)
                 return divide(subtract(first, multiply(expr, second)), right)
             case Select(condition, then, other):
-                return _select_rate(condition, self.differentiate(then), self.differentiate(other))
+                return _select_rate(
+                    condition, self._rate_of_operation(then), self._rate_of_operation(other)
+                )
             case Call(function, arguments):
                 return self._rate_of_call(function, arguments, expr)
         raise UnknownRateError
@@ -107,16 +151,21 @@ class LieDerivative:
         """
         if name in self.rates:
             return self.rates[name]
-        assigned = next((value for target, value in self.assignments if target == name), None)
+        assigned = self.values.get(name) or next(
+            (
+                self._assign_operations(value)
+                for target, value in self.assignments
+                if target == name
+            ),
+            None,
+        )
         if assigned is None:
             if name.startswith("memory."):
                 raise UnknownRateError(name)
             return ZERO  # an input, a parameter or a discrete variable
-        change = self.differentiate(assigned)
-        if change != ZERO:
-            target = f"rate of {name}"
-            self.assignments.append((target, change))
-            change = Ref(target)
+        change = self._rate_of_operation(assigned)
+        if not isinstance(change, Value | Ref):
+            change = self._assign_operations(change)
         self.rates[name] = change
         return change
 
@@ -126,7 +175,7 @@ class LieDerivative:
         `expr` is the call itself, whose value some rules reuse. Raises UnknownRateError for
         functions without a rule.
         """
-        changes = [self.differentiate(argument) for argument in arguments]
+        changes = [self._rate_of_operation(argument) for argument in arguments]
         if all(change == ZERO for change in changes):
             return ZERO
         first, change = arguments[0], changes[0]

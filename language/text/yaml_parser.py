@@ -5,6 +5,8 @@ Anchors, aliases, tags and merge keys are problems: the tree is what the text sh
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -73,7 +75,42 @@ def _describe_error(source: Source, text: str, error: yaml.YAMLError) -> tuple[S
         hint = "YAML is indented with blanks, not with tabs; quote a text that starts with a sign"
     elif "mapping values are not allowed" in what:
         hint = "quote a text that has a `: `"
+    if not (context and "flow" in context):
+        label = _describe_indentation(text.splitlines()[: mark.line + 1])
+        if label:
+            hint = "keys of one mapping have the same indentation"
+            return span, f"this is not YAML: {label}", hint
     return span, f"this is not YAML: {what}", hint
+
+
+def _describe_indentation(lines: Sequence[str]) -> str:
+    """Return what is wrong with the indentation of the last line; "" if it fits.
+
+    It fits if a line above has it with no line of smaller indentation between them, or if the line
+    before it is a key without a value and has a smaller one. Lines above without text and comments
+    are skipped.
+    """
+    *above, last = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
+    own = _indentation(last)
+    if not above or not re.match(r"\s*[\w.\-]+ *:( |$)", last):
+        return ""
+    before = _indentation(above[-1])
+    if own > before and re.search(r":\s*(#.*)?$", above[-1]):
+        return ""
+    enclosing, smallest = [], before + 1
+    for line in reversed(above):
+        if _indentation(line) < smallest:
+            smallest = _indentation(line)
+            enclosing.append(smallest)
+    if own in enclosing:
+        return ""
+    blanks = " or ".join(str(number) for number in enclosing)
+    return f"this line is indented by {own}, the lines above it by {blanks}"
+
+
+def _indentation(line: str) -> int:
+    """Return the number of blanks at the start of a line."""
+    return len(line) - len(line.lstrip(" "))
 
 
 @dataclass

@@ -218,6 +218,9 @@ def print_difference(console: Console, difference: RunDifference) -> None:
         at = f"{item.at:.6g}" if item.largest else ""
         table.add_row(item.name, item.unit, f"{item.rms:.4g}", f"{item.largest:.4g}", at, first)
     console.print(table)
+    if difference.renamed_instance:
+        text = f"signals of `{difference.renamed_instance}` in B are compared by the names of A"
+        console.print(text, highlight=False, soft_wrap=True)
     for sequence in difference.sequences:
         console.print(_sequence_line(sequence), highlight=False)
     for window in difference.windows[:MAX_EVENTS]:

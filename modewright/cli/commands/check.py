@@ -107,7 +107,10 @@ def _report_problems(
         if len(problems) > MAX_SHOWN:
             print(f"\n... and {len(problems) - MAX_SHOWN} more: --json", file=sys.stderr)
     errors = sum(problem.severity == "error" for problem in problems)
-    console().print(f"{pluralise(specs, 'spec')} checked, {pluralise(errors, 'problem')}")
+    counts = [f"{pluralise(specs, 'spec')} checked", pluralise(errors, "problem")]
+    if errors < len(problems):
+        counts.append(pluralise(len(problems) - errors, "warning"))
+    console().print(", ".join(counts))
 
 
 def _report_limits(found: Sequence[CheckResult]) -> None:

@@ -129,10 +129,16 @@ def picture_format(path: Path) -> str:
 def report_run_end(failed: bool, trajectory: Trajectory) -> None:
     """Print latched faults and the reason of a stop to stderr; exit with code PROBLEMS if `failed`.
 
-    Faults and a stop alone do not change the exit code.
+    A fault has the time and the mode at which it was set first. A compiled run does not record
+    them; a help line says so. Faults and a stop alone do not change the exit code.
     """
     for fault in trajectory.faults:
-        print(f"warning: a fault bit is set: {fault}", file=sys.stderr)
+        instant = trajectory.fault_instants.get(fault, "")
+        first = f", first at {instant}" if instant else ""
+        print(f"warning: a fault bit is set: {fault}{first}", file=sys.stderr)
+    if any(fault not in trajectory.fault_instants for fault in trajectory.faults):
+        text = "help: with `--interpreted` the time and the mode of a fault are told"
+        print(text, file=sys.stderr)
     if trajectory.stopped:
         print(f"error: the run stopped: {trajectory.stopped}", file=sys.stderr)
     if failed:

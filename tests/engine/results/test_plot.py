@@ -135,3 +135,29 @@ def test_a_mode_is_named_where_its_name_fits_whole_else_in_the_legend() -> None:
 def test_an_automaton_that_has_no_modes_has_no_band() -> None:
     assert len(draw_overview([strip([0] * 11, {0: "always"})]).figure.axes) == 4
     assert len(draw_overview([strip([0] * 11, {0: "gap"})]).figure.axes) == 5
+
+
+@pytest.mark.parametrize(
+    ("count", "stride", "label"),
+    [
+        (200, 1, "mode changes"),
+        (201, 2, "mode changes, 1 of 2 (201)"),
+        (500, 3, "mode changes, 1 of 3 (500)"),
+    ],
+)
+def test_mode_changes_are_thinned_over_the_whole_time(count: int, stride: int, label: str) -> None:
+    times = np.arange(1, count + 1) / count
+    events = tuple(Event(float(t), 1, "p", "drive", "gap", "drive") for t in times)
+    axis = draw_overview([dataclasses.replace(run(), events=events)]).figure.axes[1]
+    dotted = [np.ravel(line.get_xdata())[0] for line in axis.lines if line.get_linestyle() == ":"]
+    assert dotted == list(times[::stride])
+    legend = axis.get_legend()
+    assert legend and label in [text.get_text() for text in legend.get_texts()]
+
+
+def test_piecewise_constant_signals_are_drawn_as_steps() -> None:
+    wave = dataclasses.replace(run(), piecewise_constant=frozenset({"p.T"}))
+    axes = draw_overview([wave, run()]).figure.axes
+    styles = {line.get_label(): line.get_drawstyle() for axis in axes for line in axis.lines}
+    assert styles["p.T, A"] == "steps-post"
+    assert styles["p.T, B"] == styles["p.T_big, A"] == "default"

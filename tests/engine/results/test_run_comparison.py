@@ -145,3 +145,50 @@ def test_the_picture_shades_where_modes_disagree_and_draws_the_difference() -> N
     labels = [text.get_text() for text in figure.axes[-1].get_legend().get_texts()]  # type: ignore[union-attr]
     assert labels[0] == "A - B, RMS 1"
     assert list(figure.axes[-1].lines[0].get_ydata()) == [-1.0] * 5  # type: ignore[arg-type]
+
+
+def renamed(made: Trajectory, instance: str) -> Trajectory:
+    """Return a run of `p` with another name of its instance."""
+    return replace(
+        made,
+        signals={name.replace("p.", f"{instance}."): v for name, v in made.signals.items()},
+        units={name.replace("p.", f"{instance}."): v for name, v in made.units.items()},
+        modes={name.replace("p.", f"{instance}."): v for name, v in made.modes.items()},
+        events=tuple(replace(event, instance=instance) for event in made.events),
+    )
+
+
+def test_runs_of_one_instance_each_are_compared_by_signal() -> None:
+    a, b = run([0.0, 4.0, 0.0]), renamed(run([0.0, 1.0, 0.0]), "variant")
+    found = compare_runs(a, b, tolerances={"p.T": 5.0})
+    assert found.renamed_instance == "variant"
+    assert [signal.name for signal in found.signals] == ["p.T"]
+    assert found.is_within and found.only_a == found.only_b == ()
+    assert draw_difference(a, b, found, ("A", "B")).data().startswith(b"\x89PNG")
+
+
+def test_the_transitions_of_a_renamed_instance_are_compared() -> None:
+    a = run([0.0, 0.0, 0.0], [0, 1, 1])
+    found = compare_runs(a, renamed(run([0.0, 0.0, 0.0], [0, 0, 0]), "variant"))
+    assert [sequence.instance for sequence in found.sequences] == ["p"]
+    assert (found.sequences[0].count_a, found.sequences[0].count_b) == (1, 0)
+
+
+@pytest.mark.parametrize("name", ["q.other", "T"])
+def test_an_instance_is_renamed_only_if_a_signal_is_in_common_then(name: str) -> None:
+    a = run([1.0])
+    b = Trajectory("b", a.times, {name: np.zeros(1)}, {name: "N*m"}, {}, ())
+    message = f"the signals of A are p.T, p.mode; those of B are {name}"
+    with pytest.raises(ValueError, match=f"no signal in common: {message}"):
+        compare_runs(a, b)
+
+
+def test_an_instance_among_others_is_not_renamed() -> None:
+    a, b = run([1.0]), renamed(run([1.0]), "first")
+    both = replace(
+        b,
+        signals={**b.signals, "second.T": np.zeros(1)},
+        units={**b.units, "second.T": "N*m"},
+    )
+    with pytest.raises(ValueError, match="no signal in common"):
+        compare_runs(a, both)

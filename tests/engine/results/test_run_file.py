@@ -38,6 +38,8 @@ def run(count: int = len(HARD)) -> Trajectory:
         events=(Event(0.1 + 0.2, 1, "plant", "drive", "gap", "drive"),),
         stopped="`gap`, at 0.3 s",
         faults=("est: range",),
+        piecewise_constant=frozenset({"plant.T_hs", "plant.mode"}),
+        fault_instants={"est: range": "t = 0.2 s, `est` in mode `gap`"},
     )
 
 

@@ -327,3 +327,53 @@ def test_a_constant_outside_of_the_range_of_its_target_is_reported(
     text = text.replace("outputs: [mode]", "outputs: [mode, last]")
     found = kinds(tmp_path, text.replace("x > 2 m, priority: 2", "x < -2 m, priority: 2"))
     assert found == expected
+
+
+EVENTS = """language: 1
+automaton: machine
+period: 10 ms
+numbers: float32
+inputs: {{u: {{unit: 1, range: [0, 2]}}, stop: {{type: bool}}}}
+events: {{{events}}}
+initial: low
+modes:
+  low: {{transitions: {{high: {{when: u > 1, priority: 2{first}}}}}}}
+  high: {{transitions: {{low: {{when: u < 1, priority: 1{second}}}}}}}
+outputs: [mode]
+"""
+
+
+@pytest.mark.parametrize(
+    ("events", "first", "second", "expected"),
+    [
+        ("hot: {}", ", raise: hot", ", event: hot", []),
+        ("hot: {}", ", raise: hot", "", ["event `hot` is raised, but no transition has"]),
+        ("hot: {}", "", ", event: hot", ["this never fires: nothing raises `hot`"]),
+        ("hot: {}", "", "", ["event `hot` is never raised, and no transition has"]),
+        ("stop: {from: input}", "", ", event: stop", []),
+        ("stop: {from: input}", "", "", ["input `stop` is read nowhere"]),
+        (
+            "hot: {}, cold: {}",
+            ", raise: [hot, cold]",
+            ", event: [hot]",
+            ["event `cold` is raised, but no transition has"],
+        ),
+        (
+            "hot: {}, cold: {}",
+            ", raise: hot",
+            ", event: [hot, cold]",
+            ["event `cold` is never raised"],
+        ),
+    ],
+)
+def test_events_that_nothing_raises_or_reacts_to(
+    tmp_path: Path, events: str, first: str, second: str, expected: list[str]
+) -> None:
+    text = EVENTS.format(events=events, first=first, second=second)
+    if "stop" not in events:
+        text = text.replace(", stop: {type: bool}", "")
+    path = tmp_path / "machine.yaml"
+    path.write_text(text)
+    found = [problem for problem in mw.check(str(path)) if problem.kind != "stuck"]
+    labels = [problem.label for problem in found]
+    assert [label[: len(start)] for label, start in zip(labels, expected, strict=True)] == expected

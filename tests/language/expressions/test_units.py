@@ -23,9 +23,10 @@ from language.expressions.units import (
     display_unit,
     parse_unit,
     unit_hint,
+    unit_without_parentheses,
 )
 from tests.language.si_factors import MEANING
-from tests.language.spec_builders import automaton, si_value
+from tests.language.spec_builders import automaton, raised_problems, si_value, tree
 
 TURNING = {"deg": ("pi / 180", 0), "rev": ("2 * pi", 0), "rpm": ("2 * pi / 60", -1)}
 """Units with pi in their factor: the formula and the power of the second."""
@@ -255,3 +256,29 @@ modes: {only: {}}
 @pytest.mark.parametrize("text", ["V", "ohm", "N/m", "A*s/V", "V*s/A", "K/W", "N*m", "W", "Pa"])
 def test_a_dimension_is_shown_by_its_common_name(text: str) -> None:
     assert display_unit(str(parse_unit(text).dimension)) == display_unit(text) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "written"),
+    [
+        ("1/(kg*m^2)", "1/kg/m^2"),
+        ("N/(m*s)", "N/m/s"),
+        ("1/(kg/m)", "1/kg*m"),
+        ("(N*m)/rad", "N*m/rad"),
+        ("(kg*m)/(s*A)", "kg*m/s/A"),
+        ("1/(kgs*m)", ""),
+        ("1/(s)/(m)", "1/s/m"),
+        ("N*m", ""),
+    ],
+)
+def test_a_unit_with_parentheses_is_shown_without_them(text: str, written: str) -> None:
+    assert unit_without_parentheses(text) == written
+    if written:
+        assert unit_hint(text) == f"a unit has no parentheses: write `{written}`"
+
+
+def test_a_unit_with_parentheses_in_an_expression() -> None:
+    (problem,) = raised_problems(lambda: tree("u * 2 1/(kg*m^2) + 1"))
+    assert problem.label == "`1/(kg*m^2)` is not written as a unit"
+    assert (problem.span.column, problem.span.width) == (7, 10)
+    assert problem.help == "a unit has no parentheses: write `1/kg/m^2`"

@@ -11,6 +11,7 @@ from hypothesis import given, settings, strategies as st
 
 from language.loading.system_reader import read_system
 from language.model.system import System
+from language.text.diagnostic import SpecError
 from language.text.document import ScalarNode
 from tests.language.spec_builders import document, problem_lines, project_of, raised_problems
 
@@ -213,3 +214,31 @@ def test_an_input_of_a_system_has_no_range(folder: Path) -> None:
     (problem,) = raised_problems(lambda: read_system(document(text), project_of(folder)))
     assert problem.label == "`range` is not a key of `inputs.speed`"
     assert problem.help == "the range belongs to the input of the automaton that reads it"
+
+
+@pytest.mark.parametrize(
+    ("connections", "expected"),
+    [
+        ("p.u: q.x * 1 1/s, q.u: p.x * 1 1/s", ["`q` and `p` are both continuous"]),
+        (
+            "p.u: (q.x - p.x) * 1 1/s, q.u: (p.x - q.x) * 1 1/s",
+            ["`q` and `p` are both continuous"],
+        ),
+        ("p.u: q.x * 1 1/s, p.turn: q.x * 1 rad/m/s, q.u: 0", ["`q` and `p` are both continuous"]),
+        (
+            "p.u: 'delay(p.x, 1 ms) * -1 1/s', q.u: 0",
+            ["`p` is continuous and reads its own output `p.x`"],
+        ),
+        (
+            "p.u: p.x * -1 1/s, q.u: q.x * 1 1/s + p.x * 1 1/s",
+            ["`p` is continuous and reads its own output `p.x`", "`p` and `q` are both continuous"],
+        ),
+    ],
+)
+def test_a_pair_of_continuous_automata_is_reported_once(
+    folder: Path, connections: str, expected: list[str]
+) -> None:
+    instances = "p: {of: plant}, q: {of: plant}"
+    with pytest.raises(SpecError) as raised:
+        read_rig(folder, connections, instances)
+    assert [problem.label for problem in raised.value.problems] == expected
