@@ -93,7 +93,7 @@ def check_tunable_waits(automaton: Automaton, problems: Problems) -> None:
             problems.error("wait", parameter.span, label, hint)
         _, high = wait_range_in_ticks(automaton, parameter)
         ticks = seconds_to_ticks(automaton, parameter.value or Fraction(0))
-        if (parameter.range and parameter.range[0] < 0) or max(high, ticks) > MAX_WAIT_TICKS:
+        if (parameter.range and parameter.range[0] < 0) or max(high, Fraction(ticks)) > MAX_WAIT_TICKS:
             label = f"`{name}` is a wait: its range is within 0 to {MAX_WAIT_TICKS} ticks"
             problems.error("wait", parameter.span, label)
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from fractions import Fraction
 
 from codegen.exchange.calibration.characteristic import Cell
-from language.expressions.unit_symbols import MISSPELLED_UNITS
+from language.expressions.unit_spellings import unit_meanings
 from language.expressions.units import Unit, UnitError, are_compatible, parse_unit
 from language.text.diagnostic import Problems
 from language.text.sanitise import truncate
@@ -20,29 +19,6 @@ MAX_LENGTH, MAX_SHOWN = 400, 60
 """Maximum length of a number that is read, and of a text that is quoted [characters]."""
 NO_UNIT_WORDS = ("-", "--", "---", "[-]", "unitless", "dimensionless", "none", "n/a", "no unit")
 """Texts, in small letters, that tools write where no unit is declared."""
-UNIT_SYNONYMS: Mapping[str, str] = {
-    **dict.fromkeys(("\N{DEGREE SIGN}C", "\N{DEGREE CELSIUS}", "deg C"), "degC"),
-    **dict.fromkeys(("\N{GREEK CAPITAL LETTER OMEGA}", "\N{OHM SIGN}"), "ohm"),
-    **dict.fromkeys(("%", "Percent", "pct"), "percent"),
-    "kNm": "kN*m",
-    "\N{DEGREE SIGN}": "deg",
-}
-"""Spellings of units in calibration tools, and the units of the language."""
-SUPERSCRIPTS = str.maketrans(
-    {
-        "\N{SUPERSCRIPT TWO}": "^2",
-        "\N{SUPERSCRIPT THREE}": "^3",
-        "\N{MIDDLE DOT}": "*",
-        "\N{DOT OPERATOR}": "*",
-    }
-)
-"""Characters in units, and their notation in the language."""
-UNIT_WORD = re.compile(r"[^\W\d_]+|\N{DEGREE SIGN}[^\W\d_]*|%")
-"""A symbol inside a unit."""
-GROUP = re.compile(r"(/?)\(([^()]*)\)")
-"""A part of a unit in parentheses, with the division sign before it."""
-INVERSE = str.maketrans("*/", "/*")
-"""The operators of a part of a unit by which something is divided."""
 
 
 def parse_cell_number(cell: Cell, problems: Problems) -> Fraction | None:
@@ -76,40 +52,25 @@ def is_blank_unit(cell: Cell | None) -> bool:
 def parse_unit_cell(cell: Cell | None, declared_unit: Unit, problems: Problems) -> Unit | None:
     """Return the unit of a cell; the SI unit of `declared_unit` if the cell declares none.
 
-    Spellings of tools (`rewrite_unit`) are accepted. Returns None with a problem reported if the
+    Spellings of tools (`unit_meanings`) are accepted. Returns None with a problem reported if the
     unit has another dimension than `declared_unit`. Raises UnitError if it is unknown.
     """
     si = Unit(str(declared_unit.dimension), Fraction(1), declared_unit.dimension)
     if cell is None or is_blank_unit(cell) or cell.text == si.text:
         return si
-    unit = parse_unit(rewrite_unit(cell.text.strip()))
-    if are_compatible(unit.dimension, declared_unit.dimension):
-        return unit
+    for unit in _meanings(cell.text.strip()):
+        if are_compatible(unit.dimension, declared_unit.dimension):
+            return unit
     label = f"`{cell.text}` does not fit the unit `{declared_unit.text}`"
     problems.error("dimension", cell.span, label)
     return None
 
 
-def rewrite_unit(text: str) -> str:
-    """Return a unit of a tool in the notation of the language, as far as it is known.
-
-    `Nms/rad` gives `N*m*s/rad`, `Nm/(rad/s)` gives `N*m/rad*s`, `m/s2` and `m/s\N{SUPERSCRIPT TWO}`
-    give `m/s^2`, and `kg m2` gives `kg*m^2`. The text of a unit of the language stays as it is.
-    """
+def _meanings(text: str) -> tuple[Unit, ...]:
+    """Return a unit of the language, else the units that a text of a tool can mean (UnitError)."""
     try:
-        return parse_unit(text).text
+        return (parse_unit(text),)
     except UnitError:
-        pass
-    text = text.translate(SUPERSCRIPTS)
-    if text in UNIT_SYNONYMS:
-        return UNIT_SYNONYMS[text]
-    text = re.sub(r"(?<=[^\W\d_])(-?\d)", r"^\1", text)
-    text = re.sub(r"(?<=[\w)])(?: +|\.)(?=[^\W\d_])", "*", text)
-    text = UNIT_WORD.sub(lambda match: _rewrite_symbol(match[0]), text)
-    return GROUP.sub(lambda m: m[1] + (m[2].translate(INVERSE) if m[1] else m[2]), text)
-
-
-def _rewrite_symbol(symbol: str) -> str:
-    """Return the unit of a symbol of a tool, in parentheses if it is composed of several."""
-    unit = UNIT_SYNONYMS.get(symbol) or MISSPELLED_UNITS.get(symbol, symbol)
-    return f"({unit})" if re.search("[*/]", unit) else unit
+        if meanings := unit_meanings(text):
+            return meanings
+        raise

@@ -118,7 +118,8 @@ class TestAFileThatCannotBeRead:
         monkeypatch.chdir(tmp_path)
         (tmp_path / "drives").mkdir()
         assert problems_of_file(tmp_path / "drives", tmp_path) == (
-            "drives:1:1: error: the recording cannot be read: Is a directory"
+            "drives:1:1: error: the recording cannot be read: it is a folder, a pipe or a device\n"
+            "help: write its content into a file first"
         )
 
     @pytest.mark.parametrize("data", [b"", b"\n", b"  \r\n\n", b"\xef\xbb\xbf"])

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from codegen.exchange.calibration.cell_parser import rewrite_unit
+from codegen.exchange.calibration.cell_parser import parse_unit_cell
+from codegen.exchange.calibration.characteristic import Cell
 from language.expressions.unit_symbols import SYMBOLS
 from language.expressions.units import parse_unit
-from language.text.diagnostic import SpecError
+from language.text.diagnostic import Problems, Source, Span, SpecError
 from modewright.api.calibrations import ImportedPage, import_calibration
 from tests.codegen.exchange.calibration.tunable_project import write_project
 
@@ -154,11 +155,20 @@ def test_the_first_other_point_of_a_table_is_named(root: Path) -> None:
         ("RPM", "rpm"),
     ],
 )
-def test_units_of_tools_in_the_notation_of_the_language(text: str, unit: str) -> None:
-    assert rewrite_unit(text) == parse_unit(unit).text == unit
+def test_units_of_tools_are_those_of_the_language(text: str, unit: str) -> None:
+    known = parse_unit(unit)
+    found = parse_unit_cell(Cell(text, Span(Source("page"), 1, 1)), known, Problems())
+    assert found is not None
+    assert (found.factor, found.offset, found.dimension) == (
+        known.factor,
+        known.offset,
+        known.dimension,
+    )
 
 
 @pytest.mark.parametrize("symbol", sorted(SYMBOLS))
 def test_a_unit_of_the_language_stays_as_it_is(symbol: str) -> None:
     for text in (symbol, f"1/{symbol}", f"N*m/{symbol}", f"{symbol}^2"):
-        assert rewrite_unit(text) == text
+        unit = parse_unit(text)
+        cell = Cell(text, Span(Source("page"), 1, 1))
+        assert parse_unit_cell(cell, unit, Problems()) == unit
