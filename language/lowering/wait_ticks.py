@@ -91,9 +91,9 @@ def check_tunable_waits(automaton: Automaton, problems: Problems) -> None:
             label = f"`{name}` is a tunable wait, and read elsewhere too"
             hint = "a tunable wait is stored in ticks: use a separate parameter for it"
             problems.error("wait", parameter.span, label, hint)
-        _, high = wait_range_in_ticks(automaton, parameter)
-        ticks = seconds_to_ticks(automaton, parameter.value or Fraction(0))
-        if (parameter.range and parameter.range[0] < 0) or max(high, Fraction(ticks)) > MAX_WAIT_TICKS:
+        ticks = Fraction(seconds_to_ticks(automaton, parameter.value or Fraction(0)))
+        most = max(ticks, wait_range_in_ticks(automaton, parameter)[1])
+        if (parameter.range and parameter.range[0] < 0) or most > MAX_WAIT_TICKS:
             label = f"`{name}` is a wait: its range is within 0 to {MAX_WAIT_TICKS} ticks"
             problems.error("wait", parameter.span, label)
 
