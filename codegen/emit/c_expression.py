@@ -50,9 +50,9 @@ def emit_expression(expr: Expr, c_names: CNameMap) -> str:
 
     Every compound operand is in parentheses, also a unary minus or negative literal; except a left
     operand that C evaluates first anyway (LEFT_ASSOCIATIVE). A comparison of a variable with an
-    integer literal uses `integer_constant`; if exactly one of two compared variables is unsigned,
-    it is cast to int32_t. An integer literal beside an unsigned operand has the suffix U. A lookup
-    in a volatile table calls the function of the header ha_page.
+    integer literal uses `integer_constant`. A counter, which is unsigned and below 2^31, is cast to
+    int32_t beside a signed operand; a literal that is added to it has the suffix U. A lookup in a
+    volatile table calls the function of the header ha_page.
     """
     match expr:
         case Value(value):
@@ -62,7 +62,7 @@ def emit_expression(expr: Expr, c_names: CNameMap) -> str:
         case Item(name, index):
             return f"{c_names(name)}[{emit_expression(index, c_names)}]"
         case Unary("-", operand):
-            return f"-{_emit_operand(operand, c_names)}"
+            return f"-{_emit_signed(operand, c_names)}"
         case Unary(_, operand):
             return f"!{_emit_operand(operand, c_names)}"
         case Binary(operator, left, right):
@@ -73,15 +73,10 @@ def emit_expression(expr: Expr, c_names: CNameMap) -> str:
             if isinstance(left, Ref) and isinstance(right, Value) and type(right.value) is int:
                 constant = c_names.integer_constant(left.name, right.value)
                 return f"{c_names(left.name)} {operator} {constant}"
-            if isinstance(left, Ref) and isinstance(right, Ref):
-                first, second = _match_signedness(left.name, right.name, c_names)
-                return f"{first} {operator} {second}"
-            return f"{_emit_operand(left, c_names)} {operator} {_emit_operand(right, c_names)}"
+            first, second = _emit_matched(left, right, c_names)
+            return f"{first} {operator} {second}"
         case Select(condition, then, other):
-            first, second = (
-                _emit_beside(part, beside, c_names)
-                for part, beside in ((then, other), (other, then))
-            )
+            first, second = _emit_matched(then, other, c_names)
             return f"{_emit_operand(condition, c_names)} ? {first} : {second}"
         case Call(function, arguments):
             texts = [emit_expression(argument, c_names) for argument in arguments]
@@ -111,18 +106,22 @@ def format_literal(value: float | int | bool, number: NumberType) -> str:
     return shortest_decimal(value, number) + MATH_SUFFIX[number].upper()
 
 
-def _match_signedness(left: str, right: str, c_names: CNameMap) -> list[str]:
-    """Return the C text of two compared variables.
+def _emit_matched(left: Expr, right: Expr, c_names: CNameMap) -> list[str]:
+    """Return the C texts of two operands of one type.
 
-    If exactly one of them is unsigned, it is cast to int32_t.
+    They are unsigned if both are, or if one is and the other is a literal, which then has the
+    suffix U; else an unsigned one is cast to int32_t.
     """
-    names = (left, right)
-    unsigned = [c_names.is_unsigned(name) for name in names]
-    mixed = len(set(unsigned)) == 2
-    return [
-        f"(int32_t){c_names(name)}" if mixed and is_unsigned else c_names(name)
-        for name, is_unsigned in zip(names, unsigned, strict=True)
-    ]
+    both = (left, right)
+    if not _are_unsigned(left, right, c_names):
+        return [_emit_signed(one, c_names) for one in both]
+    return [_emit_operand(one, c_names) + ("U" if isinstance(one, Value) else "") for one in both]
+
+
+def _emit_signed(expr: Expr, c_names: CNameMap) -> str:
+    """Return the C text of an operand; an unsigned one is cast to int32_t."""
+    text = _emit_operand(expr, c_names)
+    return f"(int32_t){text}" if _is_unsigned(expr, c_names) else text
 
 
 def _emit_operand(expr: Expr, c_names: CNameMap) -> str:
@@ -134,28 +133,43 @@ def _emit_operand(expr: Expr, c_names: CNameMap) -> str:
 
 def _emit_binary(binary: Binary, operator: str, left: Expr, right: Expr, c_names: CNameMap) -> str:
     """Return the C text of a binary operation; `operator` is its operator in C."""
+    if _is_unsigned(binary, c_names):
+        return f"{_emit_operand(left, c_names)} {operator} {_emit_operand(right, c_names)}U"
     chained = isinstance(left, Binary) and left.operator in LEFT_ASSOCIATIVE.get(
         binary.operator, ""
     )
-    first = emit_expression(left, c_names) if chained else _emit_operand(left, c_names)
-    return f"{first} {operator} {_emit_beside(right, left, c_names)}"
-
-
-def _emit_beside(expr: Expr, beside: Expr, c_names: CNameMap) -> str:
-    """Return the C text of an operand; an integer literal beside an unsigned one has a U."""
-    is_integer = isinstance(expr, Value) and type(expr.value) is int
-    suffix = "U" if is_integer and _is_unsigned(beside, c_names) else ""
-    return _emit_operand(expr, c_names) + suffix
+    is_first = chained and not _is_unsigned(left, c_names)
+    first = emit_expression(left, c_names) if is_first else _emit_signed(left, c_names)
+    return f"{first} {operator} {_emit_signed(right, c_names)}"
 
 
 def _is_unsigned(expr: Expr, c_names: CNameMap) -> bool:
-    """Tell whether an expression is an unsigned variable, or a sum that begins with one."""
+    """Tell whether an expression is unsigned in C: a counter, a counter plus an integer literal, or
+    a choice between such expressions and literals.
+    """
     match expr:
         case Ref(name):
             return c_names.is_unsigned(name)
-        case Binary("+", left, _):
-            return _is_unsigned(left, c_names)
+        case Binary("+", Ref(name), Value() as literal):
+            return c_names.is_unsigned(name) and _is_natural(literal)
+        case Select(_, then, other):
+            return _are_unsigned(then, other, c_names)
     return False
+
+
+def _are_unsigned(left: Expr, right: Expr, c_names: CNameMap) -> bool:
+    """Tell whether two operands can have an unsigned type: one is unsigned, the other is so too or
+    a literal.
+    """
+    known = [_is_unsigned(one, c_names) for one in (left, right)]
+    return any(known) and all(
+        is_known or _is_natural(one) for is_known, one in zip(known, (left, right), strict=True)
+    )
+
+
+def _is_natural(expr: Expr) -> bool:
+    """Tell whether an expression is an integer literal of at least 0."""
+    return isinstance(expr, Value) and type(expr.value) is int and expr.value >= 0
 
 
 def _emit_call(function: str, arguments: list[str], number: NumberType) -> str:

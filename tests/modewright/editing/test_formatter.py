@@ -6,6 +6,7 @@ import errno
 import os
 import random
 from pathlib import Path
+from typing import IO, Any
 
 import pytest
 from typer.testing import CliRunner
@@ -208,7 +209,11 @@ def test_what_cannot_be_written_is_not_told_as_changed(
     path = tmp_path / "a.yaml"
     path.write_text(UNTIDY)
 
-    def full(descriptor: int, *_: object) -> None:
+    opened = os.fdopen
+
+    def full(descriptor: int, mode: str = "r") -> IO[Any]:
+        if "w" not in mode:
+            return opened(descriptor, mode)
         os.close(descriptor)
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
