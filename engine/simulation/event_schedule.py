@@ -11,17 +11,13 @@ from fractions import Fraction
 
 from language.ir.program import Program
 from language.model.system import Scenario, Stimulus, System
-from language.text.diagnostic import Problem, SpecError
+from language.text.diagnostic import LargeRunWarning, Problem, SpecError
 
 MAX_INSTANTS = 100_000_000
 """Largest number of ticks, samples and rows of a run: about an hour of interpretation."""
 
 LARGE_ROW_COUNT = 10_000_000
 """Number of recorded rows above which a run is announced: 80 MB for each signal."""
-
-
-class LargeRunWarning(UserWarning):
-    """A run records so many rows that it takes long and may need more memory than there is."""
 
 
 class TimeGrid:

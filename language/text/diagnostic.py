@@ -194,3 +194,7 @@ class MissingToolError(Exception):
 
 class BrokenToolError(MissingToolError):
     """An error for an installed program that does not work; the message has the reason."""
+
+
+class LargeRunWarning(UserWarning):
+    """A run records so many rows that it takes long and may need more memory than there is."""

@@ -15,8 +15,13 @@ from typing import Any
 
 import typer
 
-from engine.simulation.event_schedule import LargeRunWarning
-from language.text.diagnostic import MissingToolError, SpecError, render_all, sort_problems
+from language.text.diagnostic import (
+    LargeRunWarning,
+    MissingToolError,
+    SpecError,
+    render_all,
+    sort_problems,
+)
 from language.text.sanitise import escape_invisible, truncate
 from modewright.cli.common.escaping_stream import escape_standard_streams
 from modewright.runtime.output_files import OutputError
