@@ -11,11 +11,12 @@ from modewright.cli.common.exit_codes import run_with_exit_code
 from tests.validation.properties.robustness import draw_pair, find_failures, write_files
 
 SEED = 1
-CHEAP = (2, 7, 10, 15, 17, 18, 19, 21, 23, 25, 26)
+CHEAP = (2, 7, 10, 15, 17, 18)
 """Pairs that take less than two seconds each."""
+LONG = [pytest.param(number, marks=pytest.mark.long) for number in (19, 21, 23, 25, 26)]
 
 
-@pytest.mark.parametrize("number", CHEAP)
+@pytest.mark.parametrize("number", [*CHEAP, *LONG])
 def test_faulty_recordings_end_with_a_reason(
     number: int,
     tmp_path: Path,

@@ -27,7 +27,7 @@ def fit_number(number: int, folder: Path) -> list[ParameterResult]:
     return list(fit_machine(machine, simulate_machine(machine, folder / "case", number)))
 
 
-@pytest.mark.parametrize("number", [THERMOSTAT, HALF_BRIDGE])
+@pytest.mark.parametrize("number", [THERMOSTAT, pytest.param(HALF_BRIDGE, marks=pytest.mark.long)])
 def test_intervals_contain_the_simulated_parameters(number: int, tmp_path: Path) -> None:
     found = fit_number(number, tmp_path)
     assert sum(one.z**2 for one in found) < chi2.ppf(MOST_CHI2, len(found)), found
