@@ -50,8 +50,9 @@ def emit_expression(expr: Expr, c_names: CNameMap) -> str:
 
     Every compound operand is in parentheses, also a unary minus or negative literal; except a left
     operand that C evaluates first anyway (LEFT_ASSOCIATIVE). A comparison of a variable with an
-    integer literal uses `integer_constant`. A counter, which is unsigned and below 2^31, is cast to
-    int32_t beside a signed operand; a literal that is added to it has the suffix U. A lookup in a
+    integer literal uses `integer_constant`. An unsigned variable (a counter, an enumeration), which
+    is below 2^31, is cast to int32_t beside a signed operand; a literal that is added to it has the
+    suffix U. A lookup in a
     volatile table calls the function of the header ha_page.
     """
     match expr:
@@ -144,8 +145,8 @@ def _emit_binary(binary: Binary, operator: str, left: Expr, right: Expr, c_names
 
 
 def _is_unsigned(expr: Expr, c_names: CNameMap) -> bool:
-    """Tell whether an expression is unsigned in C: a counter, a counter plus an integer literal, or
-    a choice between such expressions and literals.
+    """Tell whether an expression is unsigned in C: an unsigned variable, one plus an integer literal,
+    or a choice between such expressions and literals.
     """
     match expr:
         case Ref(name):

@@ -21,7 +21,7 @@ def quantities_of(model: Estimate) -> dict[str, Quantity]:
 
     The standard deviation of a shared parameter is that of `marginal_covariance`. A parameter per
     recording has the mean of its values, and the standard deviation of an average recording with
-    the shared parameters fixed. The model must have normal equations.
+    the shared parameters fixed. The model must have normal equations and a Jacobian.
     """
     assert model.normal_equations is not None
     covariance, names = marginal_covariance(model)
@@ -57,7 +57,7 @@ def marginal_covariance(model: Estimate) -> tuple[Reals, list[str]]:
     Coordinates per recording are eliminated, so their uncertainty is included. Innovations of a
     model that lacks physics are correlated. The variance of a parameter is therefore at least the
     long-run variance of its influences (`long_run_variance`; Newey and West 1987). The model must
-    have normal equations; without a Jacobian the innovations count as independent.
+    have normal equations and a Jacobian.
     """
     normal = model.normal_equations
     assert normal is not None
@@ -68,15 +68,13 @@ def marginal_covariance(model: Estimate) -> tuple[Reals, list[str]]:
         projections.append(solve(inner, a[np.ix_(own, free)]))
         information = information + a[np.ix_(free, free)] - a[np.ix_(free, own)] @ projections[-1]
     covariance = solve(information, np.eye(len(free)))
-    ratios = np.ones(len(free))
-    if model.jacobian:
-        scores = _scores(model)
-        influences = [
-            (scores[rows][:, free] - scores[rows][:, own] @ projection) @ covariance
-            for rows, projection in zip(model.prediction.slices, projections, strict=True)
-        ]
-        found = [long_run_variance([one[:, k] for one in influences]) for k in range(len(free))]
-        ratios = np.maximum(np.array(found) / np.diag(covariance), 1.0)
+    scores = _scores(model)
+    influences = [
+        (scores[rows][:, free] - scores[rows][:, own] @ projection) @ covariance
+        for rows, projection in zip(model.prediction.slices, projections, strict=True)
+    ]
+    found = [long_run_variance([one[:, k] for one in influences]) for k in range(len(free))]
+    ratios = np.maximum(np.array(found) / np.diag(covariance), 1.0)
     values, parameters = model.values(0), model.candidate.free_parameters
     slopes = [
         parameters[k].prior_std * (values[parameters[k].name] if parameters[k].is_log else 1.0)

@@ -13,6 +13,8 @@ from functools import cache
 from language.expressions.unit_symbols import SYMBOLS
 from language.expressions.units import Unit, UnitError, parse_unit
 
+NO_UNIT_WORDS = ("-", "--", "---", "unitless", "dimensionless", "no unit", "none", "n/a")
+"""Texts, in small letters, that tools write where no unit is declared."""
 UNIT_WORDS: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("rpm", "1/min", "/min", "min^-1", "min-1"), ("rpm", "1/min")),
     **dict.fromkeys(("U/min", "r/min", "rev/min", "tr/min", "rot/min", "upm"), ("rpm", "1/min")),
@@ -22,8 +24,7 @@ UNIT_WORDS: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("rad/s", "rad/sec", "radps"), ("rad/s",)),
     **dict.fromkeys(("deg/s", "deg/sec", "dps", "degps"), ("deg/s",)),
     **dict.fromkeys(("kgm^2", "kgm2"), ("kg*m^2",)),
-    **dict.fromkeys(("1", "-", "--", "---", "unitless", "dimensionless", "no unit"), ("1",)),
-    **dict.fromkeys(("none", "n/a"), ("1",)),
+    **dict.fromkeys(("1", *NO_UNIT_WORDS), ("1",)),
     **dict.fromkeys(("bool", "boolean", "flag", "enum", "state", "count", "counts"), ("1",)),
     **dict.fromkeys(("%", "pct", "prozent", "per cent"), ("percent",)),
     **dict.fromkeys(("deg C", "degrees C", "degree C", "degCelsius", "celsius"), ("degC",)),

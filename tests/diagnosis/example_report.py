@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -82,7 +83,10 @@ def make_dossier(project: Project, layers: Sequence[PlacedEffect]) -> DiagnosisR
     each = np.tile(np.eye(len(z)) * DATA, (2, 1, 1))
     normal = NormalEquations(each, np.zeros((2, len(z))), per_recording_mask(candidate))
     point = ParameterVector(z, np.tile(z, (2, 1)))
-    model = Estimate(candidate, point, 0.0, NOTHING, NOTHING, NOTHING, normal)
+    exact = cast(Any, SimpleNamespace(stacked=np.zeros((2, 1)), slices=(slice(0, 1), slice(1, 2))))
+    exact.variances = exact.huber_limits = np.ones(1)
+    jacobian = {one.name: np.zeros((2, 1)) for one in uncertain}
+    model = Estimate(candidate, point, 0.0, exact, NOTHING, NOTHING, normal, jacobian)
     tried = tuple(CandidateFit(layer, 100.0, model, 90.0, 0.9) for layer in layers)
     compared = Round(model, {}, tried, np.ones(1), 1.0, 1.0, 200.0)
     selection = Selection(model, model, tried, compared, compared)

@@ -6,7 +6,11 @@ import re
 from fractions import Fraction
 
 from codegen.exchange.calibration.characteristic import Cell
-from language.expressions.unit_spellings import unit_meanings
+from language.expressions.unit_spellings import (
+    NO_UNIT_WORDS,
+    normalise_unit_text,
+    unit_meanings,
+)
 from language.expressions.units import Unit, UnitError, are_compatible, parse_unit
 from language.text.diagnostic import Problems
 from language.text.sanitise import truncate
@@ -17,8 +21,6 @@ MAX_EXPONENT = 400
 """Largest decimal exponent that is accepted; a double overflows or underflows beyond it."""
 MAX_LENGTH, MAX_SHOWN = 400, 60
 """Maximum length of a number that is read, and of a text that is quoted [characters]."""
-NO_UNIT_WORDS = ("-", "--", "---", "[-]", "unitless", "dimensionless", "none", "n/a", "no unit")
-"""Texts, in small letters, that tools write where no unit is declared."""
 
 
 def parse_cell_number(cell: Cell, problems: Problems) -> Fraction | None:
@@ -46,7 +48,7 @@ def parse_cell_number(cell: Cell, problems: Problems) -> Fraction | None:
 
 def is_blank_unit(cell: Cell | None) -> bool:
     """Tell whether a file declares no unit: the cell is None, empty, or one of NO_UNIT_WORDS."""
-    return cell is None or cell.text.strip().lower() in ("", *NO_UNIT_WORDS)
+    return cell is None or normalise_unit_text(cell.text).lower() in ("", *NO_UNIT_WORDS)
 
 
 def parse_unit_cell(cell: Cell | None, declared_unit: Unit, problems: Problems) -> Unit | None:

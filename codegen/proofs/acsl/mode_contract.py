@@ -83,7 +83,7 @@ def check_contracts(automaton: Automaton, program: Program, folder: Path) -> Too
         names = write_chart_contracts(chart, files, folder)
         what = f"{len(names)} functions"
         what += f", of {', '.join(chart.unsaid)} lemmas alone" if chart.unsaid else ""
-        return _told(tool, prove_chart_contracts(program.name, names, folder), what)
+        return _contract_verdict(tool, prove_chart_contracts(program.name, names, folder), what)
     if program.period is None or program.regions or not modes:
         about = "one region of a sampled automaton with transitions, and a chart, have contracts"
         return ToolVerdict("contract", tool, about, is_asked=False)
@@ -91,7 +91,7 @@ def check_contracts(automaton: Automaton, program: Program, folder: Path) -> Too
     run = sum(len(names) for names, options in asking if options == OF_CALLED)
     also = f", {run} functions that they run" if run else ""
     found = prove_contracts(folder, f"{program.name}.c", asking)
-    return _told(tool, found, f"{len(modes)} modes{also}")
+    return _contract_verdict(tool, found, f"{len(modes)} modes{also}")
 
 
 def modes_with_contract(program: Program, made: Program) -> list[ModeInfo]:
@@ -133,7 +133,8 @@ def write_contracts(
     return [(functions, options) for options in PARTS]
 
 
-def _told(tool: str, found: Asked, what: str) -> ToolVerdict:
+def _contract_verdict(tool: str, found: Asked, what: str) -> ToolVerdict:
+    """Return the verdict on the goals of contracts; `what` says which contracts were asked."""
     about = f"{found.proven} of {found.asked} goals; {what}" if found.asked else "no result"
     return ToolVerdict("contract", tool, about, found.open)
 
@@ -177,11 +178,11 @@ class _Mode:
         function = function_of(text, self.block)
         *parts, whole = outline_except(function, (MODE, FIRED)) if in_parts else [function]
         pointers = list(required(function.parameters, is_inside(text)))
-        told = [self._part(part, pointers) for part in parts]
+        texts = [self._part(part, pointers) for part in parts]
         seen = assigned(seen_of(function, self._places))
         lines = [*pointers, *self._required(), seen, *self._ensured()]
-        told.append(contract_text(lines) + add_loop_assigns(whole, self._places))
-        text = text[: function.start] + "\n".join(told) + text[function.end :]
+        texts.append(contract_text(lines) + add_loop_assigns(whole, self._places))
+        text = text[: function.start] + "\n".join(texts) + text[function.end :]
         return text, [part.name for part in (*parts, whole)]
 
     def _part(self, part: Function, pointers: Sequence[str]) -> str:
@@ -202,9 +203,9 @@ class _Mode:
         yield f"requires {MODE} == {mode} && {FIRED} == 0;"
         for count in self._counts():
             yield f"requires {self.place(count.timer)} <= {count.limit - 1};"
-        yield from (f"requires {said};" for said in self._kept())
+        yield from (f"requires {said};" for said in self._preserved_ranges())
 
-    def _kept(self) -> Iterator[str]:
+    def _preserved_ranges(self) -> Iterator[str]:
         """Yield the ranges of the whole numbers that it reads or writes."""
         block = self.made.blocks[self.block]
         for name in sorted(self.wholes.keys() & {*block_reads(block), *block_writes(block)}):
@@ -225,7 +226,7 @@ class _Mode:
             target = mode_constant(self.program, info.target)
             outcomes.append(f"({FIRED} == {info.number} && {MODE} == {target})")
         yield f"ensures {' || '.join(outcomes)};"
-        yield from (f"ensures {said};" for said in self._kept())
+        yield from (f"ensures {said};" for said in self._preserved_ranges())
         for count in self._counts():
             timer, most = self.place(count.timer), count.limit - 1
             yield f"ensures {timer} <= {most};"
