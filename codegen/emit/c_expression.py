@@ -145,8 +145,9 @@ def _emit_binary(binary: Binary, operator: str, left: Expr, right: Expr, c_names
 
 
 def _is_unsigned(expr: Expr, c_names: CNameMap) -> bool:
-    """Tell whether an expression is unsigned in C: an unsigned variable, one plus an integer literal,
-    or a choice between such expressions and literals.
+    """Tell whether an expression is unsigned in C.
+
+    It is an unsigned variable, one plus an integer literal, or a choice between these and literals.
     """
     match expr:
         case Ref(name):
