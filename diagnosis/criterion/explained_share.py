@@ -73,17 +73,19 @@ def sampled_energy(base: Estimate, floor: Reals, correlation: float) -> float:
     return float(np.sum(base.prediction.counts * excess)) / correlation
 
 
-def least_share(energy: float = math.inf) -> float:
+def least_share(energy: float = math.inf, parameters: int = 0) -> float:
     """Return the explained share from which an effect is more probable than an unknown disturbance.
 
-    It is where both have the same `log_form_weight`: 0.70 without noise, and less for a small
-    `sampled_energy`.
+    It is where both have the same `log_form_weight`: 0.70 without noise and parameters, less for a
+    small `sampled_energy`, more for an effect with `parameters`; infinite if no share is enough.
     """
     unknown = log_form_weight(None, energy)
 
     def advantage(remaining: float) -> float:
-        return log_form_weight(remaining, energy) - unknown
+        return log_form_weight(remaining, energy, parameters) - unknown
 
+    if advantage(0.0) <= 0.0:
+        return math.inf if parameters else 0.0
     return 1.0 - float(brentq(advantage, 0.0, 1.0)) if advantage(1.0) < 0.0 else 0.0
 
 

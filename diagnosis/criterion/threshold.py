@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from diagnosis.model.placed_effect import PlacedEffect
+from language.text.regular_file import read_regular_bytes
 
 DEFAULT_THRESHOLD = 20.0
 """Gain [nats] that an effect needs beyond the price of its parameters."""
@@ -56,7 +57,7 @@ def format_thresholds(thresholds: Thresholds) -> str:
 def read_thresholds(path: Path) -> Thresholds:
     """Return the thresholds of a JSON file. Raises ValueError if it is unreadable or invalid."""
     try:
-        known = json.loads(path.read_text("utf-8"))
+        known = json.loads(read_regular_bytes(path).decode("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise ValueError(f"{path} cannot be read as thresholds: {error}") from None
     if not isinstance(known, dict) or known.get("format") != FORMAT:

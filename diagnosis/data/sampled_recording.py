@@ -56,6 +56,16 @@ class UnusableRecordingError(ValueError):
     """A recording to which no model can be fitted: too few samples, or the model diverges on it."""
 
 
+def reference_time(period: float, length: float) -> float:
+    """Return the time [s] of the motions that a recording shows, for a period and a length [s].
+
+    It is `REFERENCE_TIME` if that is between five periods and a tenth of the length, else the
+    geometric mean of period and length.
+    """
+    is_shown = MIN_PERIODS * period <= REFERENCE_TIME <= length / MIN_TIMES
+    return REFERENCE_TIME if is_shown else math.sqrt(period * length)
+
+
 @dataclass(frozen=True)
 class SampledRecording:
     """A recording on a uniform grid: `inputs` (samples, inputs) and `measured` (samples, outputs).
@@ -92,14 +102,8 @@ class SampledRecording:
 
     @property
     def reference_time(self) -> float:
-        """The time [s] of which burn-in, windows and memories of disturbances are multiples.
-
-        It is `REFERENCE_TIME` if that is between five periods and a tenth of the length, else the
-        geometric mean of period and length.
-        """
-        period, length = float(self.period), float(self.period) * max(self.count, 1)
-        is_shown = MIN_PERIODS * period <= REFERENCE_TIME <= length / MIN_TIMES
-        return REFERENCE_TIME if is_shown else math.sqrt(period * length)
+        """The time [s] of which burn-in, windows and memories of disturbances are multiples."""
+        return reference_time(float(self.period), float(self.period) * max(self.count, 1))
 
     def sample_count(self, multiple: float) -> int:
         """Return the number of samples, at least 1, in a multiple of `reference_time`."""

@@ -14,28 +14,34 @@ from fractions import Fraction
 import numpy as np
 
 from diagnosis.data.array_types import Reals
+from diagnosis.data.sampled_recording import REFERENCE_TIME, reference_time
 from diagnosis.data_quality.output_comparison import OutputComparison, ReferenceModel
 from engine.recordings.recording import Channel, Recording, crop, split_by_windows
 
-GRID_STEP = 0.01
-"""Step [s] of the grid on which rates of change are compared."""
-SMOOTHING_STD = 0.04
-"""Standard deviation [s] of the Gaussian smoothing, which passes frequencies below about 4 Hz."""
-GAIN_SMOOTHING_STD = 0.15
+GRID_STEP = 0.05
+"""Step of the grid on which rates of change are compared, in reference times."""
+SMOOTHING_STD = 0.2
+"""Standard deviation of the Gaussian smoothing, in reference times.
+
+With a reference time of 0.2 s it passes frequencies below about 4 Hz.
+"""
+GAIN_SMOOTHING_STD = 0.75
 """The same for gains, below about 1 Hz, without resonances."""
-MAX_LAG = 1.0
-"""Largest clock offset [s] that is tried."""
-TRANSIENT_TIME = 0.8
-"""Time [s] after the start that is left out, because initial values differ."""
+MAX_LAG = 5.0
+"""Largest clock offset that is tried, in reference times."""
+TRANSIENT_TIME = 4.0
+"""Time after the start that is left out, because initial values differ, in reference times."""
+MIN_TIME = 5.0
+"""Shortest time that is compared, in reference times."""
 MIN_CORRELATION = 0.75
 """Correlation from which two signals are the same motion."""
 REVERSAL_MARGIN = 0.15
 """Margin by which the negated signal must correlate better: half a period of a sweep is similar."""
 LAG_MARGIN = 0.02
 """Margin by which the correlation with a lag must exceed the one without."""
-MAX_PIECE, MIN_PIECE = Fraction(10), Fraction(4)
-MAX_SIMULATED_TIME = Fraction(24)
-"""Longest and shortest piece, and total time, that is simulated [s]."""
+MAX_PIECE, MIN_PIECE = 50, 20
+MAX_SIMULATED_TIME = 120
+"""Longest and shortest piece, and total time, that is simulated, in reference times."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +49,7 @@ class OutputAgreement:
     """The agreement of outputs: measured = gain * simulated(t - lag).
 
     The gain is that of fast or of slow motion, whichever is nearer to 1. `level` is the ratio of
-    root mean squares in the second half.
+    root mean squares in the second half. `time_unit` is the reference time [s] of the signals.
     """
 
     recording: str
@@ -53,6 +59,7 @@ class OutputAgreement:
     correlation: float
     correlation_without_lag: float
     level: float = 1.0
+    time_unit: float = REFERENCE_TIME
 
     @property
     def is_clear(self) -> bool:
@@ -75,23 +82,33 @@ def compare_with_simulation(
 ) -> list[OutputAgreement]:
     """Return the agreement of each output with a simulation, in the piece of each window.
 
-    Pieces are the most excited ones of 4 to 10 s, `MAX_SIMULATED_TIME` (24 s) in all. Inputs faster
-    than 100 Hz are thinned out.
+    Pieces are the most excited ones of 20 to 50 reference times, `MAX_SIMULATED_TIME` (120) in all.
+    Inputs are thinned out to the step of the grid.
     """
     agreements: list[OutputAgreement] = []
-    remaining_time = MAX_SIMULATED_TIME
-    piece_length = min(MAX_PIECE, max(MIN_PIECE, MAX_SIMULATED_TIME / max(1, len(recordings))))
+    remaining_time = float(MAX_SIMULATED_TIME)
+    mean_length = MAX_SIMULATED_TIME // max(1, len(recordings))
+    piece_length = min(MAX_PIECE, max(MIN_PIECE, mean_length))
     for recording in recordings:
         for piece in split_by_windows(recording):
-            if remaining_time <= 0:
+            if remaining_time <= 0.0:
                 return agreements
-            part = _decimate_inputs(most_excited_piece(piece, piece_length))
-            remaining_time -= part.end - part.start
+            unit = time_unit(piece)
+            part = _decimate_inputs(most_excited_piece(piece, piece_length * unit), unit)
+            remaining_time -= float((part.end - part.start) / unit)
             for name, compared in reference.simulate(part).comparisons.items():
                 agreement = compare_signals(part.name, name, compared)
                 if agreement:
                     agreements.append(agreement)
     return agreements
+
+
+def time_unit(piece: Recording) -> Fraction:
+    """Return the reference time [s] of a recording; its period is that of the fastest output."""
+    seconds = [one.seconds for one in piece.channels.values() if one.column.compare is not None]
+    length = float(piece.end - piece.start)
+    periods = [float(np.median(np.diff(one))) for one in seconds if len(one) > 1]
+    return Fraction(reference_time(min(periods, default=length), length)).limit_denominator(10**6)
 
 
 def most_excited_piece(piece: Recording, max_length: Fraction) -> Recording:
@@ -119,12 +136,13 @@ def _places_with_samples(piece: Recording, length: Fraction, count: int) -> list
     return sorted(k for k in found if 0 <= k < count)
 
 
-def _decimate_inputs(piece: Recording) -> Recording:
-    """Return a recording with every n-th sample of its inputs, at about 100 Hz."""
+def _decimate_inputs(piece: Recording, unit: Fraction) -> Recording:
+    """Return a recording with every n-th sample of its inputs, at about the step of the grid."""
+    step = Fraction(GRID_STEP).limit_denominator(1000) * unit
     channels = dict(piece.channels)
     for name, channel in piece.channels.items():
         span = channel.times[-1] - channel.times[0]
-        every = int(len(channel.times) / (span / Fraction(GRID_STEP))) if span else 1
+        every = int(len(channel.times) / (span / step)) if span else 1
         if channel.column.to is not None and every > 1:
             part = slice(None, None, every)
             channels[name] = Channel(channel.column, channel.times[part], channel.values[part])
@@ -145,12 +163,15 @@ def _excitation_level(piece: Recording, start: Fraction, end: Fraction) -> float
 def _smoothed_rate(
     times: Reals, values: Reals, grid: Reals, spread: float = SMOOTHING_STD
 ) -> Reals:
-    """Return the rate of change after Gaussian smoothing, on the inner part of the grid."""
+    """Return the rate of change after Gaussian smoothing, on the inner part of the grid.
+
+    `spread` is in reference times, as is `GRID_STEP`.
+    """
     width = _kernel_size(spread) // 2
     kernel = np.exp(-0.5 * (np.arange(-width, width + 1) * GRID_STEP / spread) ** 2)
     even = np.interp(grid, times, values)
     smooth = np.convolve(even, kernel / kernel.sum(), mode="valid")
-    return np.gradient(smooth, GRID_STEP)
+    return np.gradient(smooth, grid[1] - grid[0])
 
 
 def _kernel_size(spread: float) -> int:
@@ -161,17 +182,20 @@ def _kernel_size(spread: float) -> int:
 def compare_signals(
     recording: str, name: str, comparison: OutputComparison, spread: float = SMOOTHING_STD
 ) -> OutputAgreement | None:
-    """Return the agreement of the rates of change of two signals, smoothed by `spread` [s].
+    """Return the agreement of the rates of change of two signals.
 
-    The gain is negative if the reversed signal correlates better by `REVERSAL_MARGIN`. The result
-    is None if less than 1 s remains, the simulation is not finite, or a rate is constant.
+    `spread` of the smoothing is in reference times. The gain is negative if the reversed signal
+    correlates better by `REVERSAL_MARGIN`. The result is None if less than `MIN_TIME` remains, the
+    simulation is not finite, or a rate is constant.
     """
-    if len(comparison.times) < 2:
+    times = comparison.times
+    if len(times) < 2 or not np.all(np.isfinite(comparison.simulated)):
         return None
-    start, end = comparison.times[0] + TRANSIENT_TIME, comparison.times[-1]
-    if end - start < 1.0 or not np.all(np.isfinite(comparison.simulated)):
+    unit = reference_time(float(np.median(np.diff(times))), float(times[-1] - times[0]))
+    start, end, step = times[0] + TRANSIENT_TIME * unit, times[-1], GRID_STEP * unit
+    if end - start < MIN_TIME * unit:
         return None
-    grid = np.arange(start, end, GRID_STEP)
+    grid = np.arange(start, end, step)
     measured = _smoothed_rate(comparison.times, comparison.measured, grid, spread)
     simulated = _smoothed_rate(comparison.times, comparison.simulated, grid, spread)
     max_shift = min(round(MAX_LAG / GRID_STEP), len(grid) // 4)
@@ -188,17 +212,17 @@ def compare_signals(
     ratios = [float(np.std(y)) / max(float(np.std(x)), 1e-12) for y, x in alike]
     gains = [min(max(ratio, 1e-6), 1e6) for ratio in ratios]
     gain = math.copysign(min(gains, key=lambda g: abs(math.log(g))), correlations[best])
-    late = comparison.times > 0.5 * (start + end)
+    late = times > 0.5 * (start + end)
     level = _rms(comparison.measured[late]) / max(_rms(comparison.simulated[late]), 1e-12)
     both = correlations[best], correlations[0]
-    return OutputAgreement(recording, name, gain, best * GRID_STEP, *both, level)
+    return OutputAgreement(recording, name, gain, best * step, *both, level, unit)
 
 
 def _low_frequency_rates(
     comparison: OutputComparison, grid: Reals, lag: int
 ) -> list[tuple[Reals, Reals]]:
     """Return a list with both rates below the resonances at a lag; empty if too short."""
-    shifted = grid + lag * GRID_STEP
+    shifted = grid + lag * (grid[1] - grid[0])
     kept = (shifted >= grid[0]) & (shifted <= grid[-1])
     if np.count_nonzero(kept) <= _kernel_size(GAIN_SMOOTHING_STD):
         return []

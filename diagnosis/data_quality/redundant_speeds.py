@@ -25,8 +25,8 @@ from engine.recordings.recording import Channel, Recording, split_by_windows
 
 MIN_CORRELATION = 0.9
 """Correlation of the rates of change from which two speeds are one motion."""
-MAX_OFFSET = 0.6
-"""A larger offset [s] is a period of the motion rather than of the clock."""
+MAX_OFFSET = 3.0
+"""A larger offset, in reference times, is a period of the motion rather than of the clock."""
 
 
 def find_redundant_speeds(recordings: Sequence[Recording]) -> list[Finding]:
@@ -76,8 +76,11 @@ def _redundancy_findings(
     if sum(agreement.gain < 0.0 for agreement in agreements) > SHARED_FRACTION * len(agreements):
         return [Finding("sign", where, second, f"{both} with opposite signs", severity)]
     lag = median(agreement.significant_lag for agreement in agreements)
-    same = sum(abs(agreement.significant_lag - lag) <= CLOCK_TOLERANCE for agreement in agreements)
-    if OFFSET_WARNING <= abs(lag) <= MAX_OFFSET and same > SHARED_FRACTION * len(agreements):
+    unit = median(agreement.time_unit for agreement in agreements)
+    near = CLOCK_TOLERANCE * unit
+    same = sum(abs(agreement.significant_lag - lag) <= near for agreement in agreements)
+    is_offset = OFFSET_WARNING * unit <= abs(lag) <= MAX_OFFSET * unit
+    if is_offset and same > SHARED_FRACTION * len(agreements):
         late = second if lag > 0.0 else first
         text = f"{both}, but the clock of `{late}` is {abs(lag):.2f} s late"
         return [Finding("clock_offset", where, late, text, severity)]

@@ -16,6 +16,7 @@ from diagnosis.data_quality.model_agreement import (
     OutputAgreement,
     compare_with_simulation,
     most_excited_piece,
+    time_unit,
 )
 from diagnosis.data_quality.output_comparison import ReferenceModel
 from diagnosis.data_quality.unit_sign_clock_errors import SHARED_FRACTION, UNIT_FACTORS
@@ -108,7 +109,7 @@ def find_corrections(
     inconsistent.sort(key=lambda one: -distances[one.name])
     corrections: dict[str, ColumnCorrection] = {}
     for recording in inconsistent[:MAX_TESTED_RECORDINGS]:
-        part = most_excited_piece(split_by_windows(recording)[0], MIN_PIECE)
+        part = _shortest_piece(recording)
         most = distances[recording.name] - MIN_DISTANCE
         best = _best_correction(part, list(dict.fromkeys(corrections.values())), most, reference)
         possible = _candidate_corrections(recording, reference.automaton, by_name[recording.name])
@@ -120,6 +121,12 @@ def find_corrections(
     if len(distinct) == 1 and len(corrections) > 1 and len(inconsistent) >= least:
         return [distinct.pop().to_finding("")]
     return [correction.to_finding(name) for name, correction in corrections.items()]
+
+
+def _shortest_piece(recording: Recording) -> Recording:
+    """Return the most excited part of the first window, as short as can be compared."""
+    piece = split_by_windows(recording)[0]
+    return most_excited_piece(piece, MIN_PIECE * time_unit(piece))
 
 
 def find_millisecond_time(recording: Recording, reference: ReferenceModel) -> list[Finding]:
@@ -135,7 +142,7 @@ def find_millisecond_time(recording: Recording, reference: ReferenceModel) -> li
     name = reference.automaton.name
     text = f"a sample each {usual:.4g} s is one in {steps:.4g} steps of `{name}`"
     try:
-        part = most_excited_piece(split_by_windows(_scale_time(recording))[0], MIN_PIECE)
+        part = _shortest_piece(_scale_time(recording))
         after = compare_with_simulation([part], reference)
     except (SpecError, ArithmeticError):
         after = []

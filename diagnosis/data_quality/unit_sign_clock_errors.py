@@ -15,12 +15,15 @@ from language.loading.recording_map_reader import column_dimension
 from language.model.automaton import Automaton
 from language.model.system import RecordingMap
 
-OFFSET_ERROR, OFFSET_WARNING = 0.1, 0.08
-"""Clock offsets [s] that are errors and warnings; actuators and sensors have lags up to 0.05 s."""
+OFFSET_ERROR, OFFSET_WARNING = 0.5, 0.4
+"""Clock offsets that are errors and warnings, in reference times.
+
+With a reference time of 0.2 s actuators and sensors have lags up to 0.05 s.
+"""
 SINGLE_RECORDING_MARGIN = 0.1
 """Increase of the correlation from which a lag in a single recording of several is reported."""
-CLOCK_TOLERANCE = 0.04
-"""Lags within this distance [s] are the same offset."""
+CLOCK_TOLERANCE = 0.2
+"""Lags within this distance are the same offset, in reference times."""
 SHARED_FRACTION = 0.6
 """Fraction of the recordings from which an error is attributed to all."""
 MAX_SCALE_RATIO = 2.5
@@ -175,6 +178,7 @@ class _AgreementsByChannel:
         self.relations = agreements
         self.gains = {name: median(r.gain for r in rs) for name, rs in agreements.items()}
         self.lags = {name: median(r.significant_lag for r in rs) for name, rs in agreements.items()}
+        self.unit = median(r.time_unit for rs in agreements.values() for r in rs)
         self.inputs = [
             channel.column.name
             for channel in recordings[0].channels.values()
@@ -255,11 +259,13 @@ class _AgreementsByChannel:
 
     def find_clock_errors(self) -> list[Finding]:
         """Return findings on outputs with a larger lag than actuators and sensors have."""
-        odd = [name for name, lag in self.lags.items() if abs(lag) >= OFFSET_WARNING]
+        odd = [name for name, lag in self.lags.items() if abs(lag) >= OFFSET_WARNING * self.unit]
         if not odd:
             return []
         lags = [self.lags[name] for name in odd]
-        together = len(odd) == len(self.lags) and max(lags) - min(lags) < CLOCK_TOLERANCE
+        together = (
+            len(odd) == len(self.lags) and max(lags) - min(lags) < CLOCK_TOLERANCE * self.unit
+        )
         groups = [odd] if together else [[name] for name in odd]
         return [self._clock_offset_finding(group, together) for group in groups]
 
@@ -275,8 +281,8 @@ class _AgreementsByChannel:
             both = f"`{channels[0]}` and input `{self.inputs[0]}`"
             text = f"the clocks of {both} are {abs(lag):.2f} s apart"
         each = [r.significant_lag for name in channels for r in self.relations[name]]
-        near = sum(abs(one - lag) <= CLOCK_TOLERANCE for one in each)
-        is_sure = near >= SHARED_FRACTION * len(each) and abs(lag) >= OFFSET_ERROR
+        near = sum(abs(one - lag) <= CLOCK_TOLERANCE * self.unit for one in each)
+        is_sure = near >= SHARED_FRACTION * len(each) and abs(lag) >= OFFSET_ERROR * self.unit
         severity: Severity = "error" if is_sure else "warning"
         return Finding("clock_offset", self.name, channel, text, severity)
 

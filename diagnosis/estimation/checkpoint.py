@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from codegen.toolchain.build_cache import read_sealed, write_sealed
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.estimate import Estimate, predict_with_gains_of
 from diagnosis.estimation.innovations import KalmanGains, NoiseLevels
@@ -25,7 +26,6 @@ from diagnosis.estimation.normal_equations import NormalEquations
 from diagnosis.model.candidate import Candidate
 from diagnosis.model.compile_cache import code_digest
 from diagnosis.model.parameter_vector import ParameterVector
-from language.text.temporary_files import write_atomically
 
 Arrays = Mapping[str, Any]
 NORMAL_FIELDS = tuple(field.name for field in dataclasses.fields(NormalEquations))
@@ -55,7 +55,7 @@ class FitCache:
         """Return the stored estimate of a fit, or compute it with `fit` and store it.
 
         The file is `<hash>.npz` in `folder`; the hash is of `label`, the code, `model_key`, the
-        candidate, the recordings and `dependencies`. An unreadable file is computed again, and a
+        candidate, the recordings and `dependencies`. A damaged file is computed again, and a
         failure to write is ignored. `before_fit` is called before `fit`, not for a stored estimate;
         what it or `fit` raises is passed on. Without a folder `fit` is always called.
         """
@@ -67,14 +67,15 @@ class FitCache:
         )
         path = self.folder / f"{name}.npz"
         with suppress(OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-            return _from_arrays(candidate, series, dict(np.load(io.BytesIO(path.read_bytes()))))
+            stored = io.BytesIO(read_sealed(path) or b"")
+            return _from_arrays(candidate, series, dict(np.load(stored)))
         self.before_fit()
         estimate = fit()
         with suppress(OSError):  # a full disk does not end the diagnosis
             data = io.BytesIO()
             np.savez(data, **_to_arrays(estimate))
             self.folder.mkdir(parents=True, exist_ok=True)
-            write_atomically(path, data.getvalue())
+            write_sealed(path, data.getvalue())
         return estimate
 
 

@@ -51,13 +51,21 @@ def correlations_of(covariance: Reals, names: Sequence[str]) -> Mapping[tuple[st
     return dict(sorted(correlations.items(), key=lambda item: -abs(item[1])))
 
 
-def marginal_covariance(model: Estimate) -> tuple[Reals, list[str]]:
-    """Return the covariance (n, n) [SI] of the shared parameters, and their names.
+def coordinate_covariance(model: Estimate) -> tuple[Reals, list[str]]:
+    """Return the covariance (n, n) of the coordinates of the shared parameters, and their names.
 
-    Coordinates per recording are eliminated, so their uncertainty is included. Innovations of a
-    model that lacks physics are correlated. The variance of a parameter is therefore at least the
-    long-run variance of its influences (`long_run_variance`; Newey and West 1987). The model must
-    have normal equations and a Jacobian.
+    Coordinates per recording are eliminated, so their uncertainty is included. Innovations count as
+    independent. The model must have normal equations.
+    """
+    covariance, _ = _eliminate_per_recording(model)
+    assert model.normal_equations is not None
+    free = np.flatnonzero(~model.normal_equations.own)
+    return covariance, [model.candidate.names[k] for k in free]
+
+
+def _eliminate_per_recording(model: Estimate) -> tuple[Reals, list[Reals]]:
+    """Return the covariance (n, n) of the shared coordinates, and the projections (own, n) on them
+    of the coordinates of each recording.
     """
     normal = model.normal_equations
     assert normal is not None
@@ -67,7 +75,21 @@ def marginal_covariance(model: Estimate) -> tuple[Reals, list[str]]:
         inner = a[np.ix_(own, own)] + np.eye(len(own))
         projections.append(solve(inner, a[np.ix_(own, free)]))
         information = information + a[np.ix_(free, free)] - a[np.ix_(free, own)] @ projections[-1]
-    covariance = solve(information, np.eye(len(free)))
+    return solve(information, np.eye(len(free))), projections
+
+
+def marginal_covariance(model: Estimate) -> tuple[Reals, list[str]]:
+    """Return the covariance (n, n) [SI] of the shared parameters, and their names.
+
+    It is that of `coordinate_covariance`, in SI. Innovations of a model that lacks physics are
+    correlated. The variance of a parameter is therefore at least the long-run variance of its
+    influences (`long_run_variance`; Newey and West 1987). The model must have normal equations and
+    a Jacobian.
+    """
+    covariance, projections = _eliminate_per_recording(model)
+    assert model.normal_equations is not None
+    own = np.flatnonzero(model.normal_equations.own)
+    free = np.flatnonzero(~model.normal_equations.own)
     scores = _scores(model)
     influences = [
         (scores[rows][:, free] - scores[rows][:, own] @ projection) @ covariance

@@ -22,7 +22,7 @@ import codegen
 import diagnosis
 import language
 from codegen.predictor.predictor import PredictorColumns
-from codegen.toolchain.build_cache import cache_subfolder
+from codegen.toolchain.build_cache import cache_subfolder, read_sealed, write_sealed
 from diagnosis.model.parameter import FreeParameter
 from language.text.document import MappingNode, ScalarNode, SequenceNode, YamlNode
 from language.text.temporary_files import write_atomically
@@ -85,13 +85,13 @@ def load_or_compile(
 ) -> tuple[CompiledModel, Path]:
     """Return the metadata and the library path of a key, from the cache or compiled now.
 
-    An unreadable or changed entry is compiled again. Raises OSError if the files cannot be written,
+    An unreadable or damaged entry is compiled again. Raises OSError if the files cannot be written,
     and what `compile_model` raises.
     """
     folder = _cache_folder()
     recipe_path, library = folder / f"{key}.json", folder / f"{key}.so"
     with suppress(OSError, ValueError, TypeError, KeyError):
-        metadata = json.loads(recipe_path.read_text())
+        metadata = json.loads(read_sealed(recipe_path) or b"")
         metadata.pop("format", None)
         if hashlib.sha256(library.read_bytes()).hexdigest() == metadata.pop("library"):
             return _from_json(metadata), library
@@ -100,7 +100,7 @@ def load_or_compile(
     entries = {**dataclasses.asdict(recipe), "library": library_digest}
     text = json.dumps({"format": FORMAT, **entries})
     write_atomically(library, data, mode=0o700)
-    write_atomically(recipe_path, text.encode())
+    write_sealed(recipe_path, text.encode())
     return recipe, library
 
 

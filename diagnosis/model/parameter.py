@@ -36,7 +36,8 @@ EFFECT_PRIOR_STD = 0.5
 class FreeParameter:
     """A parameter [SI] with a coordinate z: value = start exp(sd z) if `is_log`, else start + sd z.
 
-    sd is `prior_std`; fits begin at `starts`. `is_order` marks a number of periods over a path.
+    sd is `prior_std`; fits begin at `starts`. `is_order` marks a number of periods over a path. At
+    `plain` the effect has a simpler form.
     """
 
     name: str
@@ -49,6 +50,7 @@ class FreeParameter:
     starts: tuple[float, ...] = ()
     unit: str = "1"
     is_order: bool = False
+    plain: float | None = None
 
     def value(self, z: float) -> float:
         """Return the value [SI] at a coordinate; it may be outside the range."""
@@ -114,6 +116,7 @@ def _effect_parameter(parameter: Parameter) -> FreeParameter:
         _start_values(parameter, value),
         si_unit(parameter),
         is_log and fitting.form == "order",
+        None if fitting.plain is None else float(fitting.plain),
     )
 
 

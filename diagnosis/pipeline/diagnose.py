@@ -200,7 +200,10 @@ def _build_verdict(
     automaton: Automaton,
     fit: dict[str, dict[str, Misfit]],
 ) -> Verdict:
-    """Return the verdict of a selection, without held-out misfits and run time."""
+    """Return the verdict of a selection, without held-out misfits and run time.
+
+    An ambiguous verdict states the accepted effect first, then its rivals.
+    """
     effects = tuple(
         named_effect_of(tried.placed_effect, selection.model, automaton)
         for tried in selection.accepted

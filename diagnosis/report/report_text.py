@@ -9,7 +9,7 @@ from diagnosis.data_quality.finding import format_findings
 from diagnosis.localisation.location_text import PLACE_PHRASES, format_location
 from diagnosis.model.placed_effect import PlacedEffect, place_path
 from diagnosis.report.diagnosis_report import DiagnosisReport
-from diagnosis.report.number_text import format_quantity
+from diagnosis.report.number_text import format_probability, format_quantity
 from diagnosis.result.verdict import NamedEffect, verdict_id
 from diagnosis.selection.candidate_search import MIN_SCREENING_GAIN, CandidateFit
 from diagnosis.selection.forward_selection import Selection
@@ -30,7 +30,11 @@ def format_headline(report: DiagnosisReport) -> str:
         named = " and ".join(_format_effect_values(one) for one in verdict.effects)
         return f"`{report.name}` lacks {named}."
     if verdict.verdict == "ambiguous":
-        names = [format_effect(one) for one in verdict.ambiguous_with]
+        shares = {(one.id, one.place): one.probability for one in verdict.candidates}
+        names = [
+            f"{format_effect(one)} ({format_probability(shares.get((one.id, one.place), 0.0))})"
+            for one in verdict.ambiguous_with
+        ]
         return (
             f"`{report.name}` lacks something, and these recordings cannot tell which of these "
             f"it is: {'; '.join(names)}."
@@ -152,7 +156,8 @@ def format_reason(
         return f"gains less than {threshold:.0f} nats"
     share = f"explains {100.0 * max(candidate_fit.share, 0.0):.0f} % of what is unexplained"
     if not selection.accepted:
-        return f"{share}, {100.0 * selection.first.least_share:.0f} % are needed"
+        least = selection.first.least_share_of(candidate_fit)
+        return f"{share}, {100.0 * min(least, 1.0):.0f} % are needed"
     return f"{share}, less than what was accepted" if rank else "not needed beside the others"
 
 

@@ -20,8 +20,9 @@ from diagnosis.estimation.levenberg_marquardt import iterate, refine
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.model.candidate import Candidate
 from diagnosis.model.parameter_vector import ParameterVector, extend_vector, vector_of
-from diagnosis.model.placed_effect import PlacedEffect
+from diagnosis.model.placed_effect import PlacedEffect, effect_names
 from diagnosis.selection.intersample import LogCallback
+from diagnosis.selection.nested_form import GENERAL_FORM, NestedForm
 from diagnosis.selection.screening import screen_candidate
 
 MIN_SCREENING_GAIN = 2.0
@@ -37,7 +38,8 @@ class CandidateFit:
     """An effect at a place, with its screening gain [nats], and its fit if it was fitted.
 
     `gain` [nats] is relative to the base of the comparison, divided by the integrated
-    autocorrelation and less the price of the parameters. `share` is the explained share.
+    autocorrelation and less the price of the parameters. `share` is the explained share. `form` is
+    the nested form of the effect for which both hold.
     """
 
     placed_effect: PlacedEffect
@@ -45,11 +47,21 @@ class CandidateFit:
     estimate: Estimate | None = field(default=None, repr=False)
     gain: float = -math.inf
     share: float = 0.0
+    form: NestedForm = GENERAL_FORM
 
     @property
     def is_fitted(self) -> bool:
         """Whether the candidate was fitted."""
         return self.estimate is not None
+
+    @property
+    def parameter_count(self) -> int:
+        """The number of parameters of the form of the effect; 0 without a fit."""
+        if self.estimate is None:
+            return 0
+        own = effect_names(self.placed_effect)
+        count = sum(name in own for name in self.estimate.candidate.names)
+        return count - len(self.form.fixed)
 
     @property
     def cost(self) -> float:

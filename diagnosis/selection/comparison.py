@@ -15,7 +15,6 @@ import numpy as np
 
 from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
 from diagnosis.criterion.explained_share import (
-    MIN_SHARE,
     NEGLIGIBLE_ENERGY,
     explained_share,
     is_ordinary,
@@ -32,9 +31,10 @@ from diagnosis.estimation.model_set import ModelSet
 from diagnosis.localisation.disturbance_state_fit import free_disturbance
 from diagnosis.localisation.ranking import disturbance_locations
 from diagnosis.model.parameter_vector import extend_vector
-from diagnosis.model.placed_effect import PlacedEffect
+from diagnosis.model.placed_effect import PlacedEffect, effect_names
 from diagnosis.selection.candidate_search import CandidateFit, search_candidates
 from diagnosis.selection.intersample import LogCallback
+from diagnosis.selection.nested_form import choose_form
 
 MIN_BASE_GAIN = DEFAULT_THRESHOLD
 """Gain [nats] for which the comparison is repeated with a better fit of the base."""
@@ -68,13 +68,17 @@ class Round:
         """Whether the base leaves too little for an effect."""
         return self.energy < NEGLIGIBLE_ENERGY * len(self.floor)
 
-    @property
-    def least_share(self) -> float:
-        """The share that an effect must explain.
+    def least_share_of(self, candidate: CandidateFit) -> float:
+        """Return the share that an effect must explain to be as probable as what is unknown.
 
         If what the base leaves may be an ordinary disturbance, it is that without noise.
         """
-        return MIN_SHARE if self.is_ordinary else least_share(self.sampled_energy)
+        energy = math.inf if self.is_ordinary else self.sampled_energy
+        return least_share(energy, candidate.parameter_count)
+
+    def is_explained_by(self, candidate: CandidateFit) -> bool:
+        """Return whether an effect explains the least share."""
+        return candidate.share >= self.least_share_of(candidate)
 
 
 def compare_candidates(
@@ -170,32 +174,44 @@ def judge(
     floor = least_variances([base, *free.values(), *fits])
     best = min([base, *fits], key=lambda one: one.cost)
     correlation = integrated_autocorrelation(best, model_set.series)
-    recordings = len(model_set.series)
-    judged = [
-        replace(
-            one,
-            gain=effective_gain(one.estimate, base, correlation, recordings),
-            share=explained_share(one.estimate, base, floor),
-        )
-        if one.estimate is not None
-        else one
-        for one in found
-    ]
+    count = len(model_set.series)
+    judged = [_judge_candidate(one, base, floor, correlation, count) for one in found]
     judged.sort(key=lambda one: -one.gain)
     energy = remaining_energy(base, floor)
     sampled = sampled_energy(base, floor, correlation)
     return Round(base, free, tuple(judged), floor, energy, correlation, sampled)
 
 
+def _judge_candidate(
+    one: CandidateFit, base: Estimate, floor: Reals, correlation: float, recordings: int
+) -> CandidateFit:
+    """Return a candidate with its gain and its share; one that was not fitted is unchanged.
+
+    The gain is that of the nested form with the largest one.
+    """
+    model = one.estimate
+    if model is None:
+        return one
+    price = parameter_price(model, correlation)
+    form = choose_form(model, effect_names(one.placed_effect), correlation, price)
+    saved = len(form.fixed) * price - form.added_cost / correlation
+    gain = effective_gain(model, base, correlation, recordings) + saved
+    return replace(one, gain=gain, share=explained_share(model, base, floor), form=form)
+
+
+def parameter_price(model: Estimate, correlation: float) -> float:
+    """Return the price [nats] of a parameter: log(n) / 2 for n effective samples (Schwarz 1978)."""
+    return math.log(max(float(np.sum(model.prediction.counts)) / correlation, 2.0)) / 2.0
+
+
 def effective_gain(model: Estimate, base: Estimate, correlation: float, recordings: int) -> float:
     """Return the gain [nats] of a model over a base that it extends, less the price of parameters.
 
-    `correlation` is the number of samples that count as one; the price is log(n) / 2 for each of
-    the additional parameters, n effective samples. A parameter per recording counts for each.
+    `correlation` is the number of samples that count as one. Each additional parameter has its
+    price; one per recording has it for each recording.
     """
-    count = float(np.sum(model.prediction.counts)) / correlation
     added = _parameter_count(model, recordings) - _parameter_count(base, recordings)
-    return (base.cost - model.cost) / correlation - added / 2 * math.log(max(count, 2.0))
+    return (base.cost - model.cost) / correlation - added * parameter_price(model, correlation)
 
 
 def _parameter_count(model: Estimate, recordings: int) -> int:

@@ -26,7 +26,6 @@ from diagnosis.estimation.estimate import Estimate, with_best_gain_scale
 from diagnosis.estimation.levenberg_marquardt import estimate_parameters
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.model.parameter_vector import extend_vector
-from diagnosis.model.placed_effect import effect_names
 from diagnosis.selection.candidate_search import CandidateFit
 from diagnosis.selection.comparison import Round, compare_candidates, effective_gain, judge
 from diagnosis.selection.intersample import LogCallback
@@ -74,7 +73,7 @@ def candidate_probabilities(compared: Round) -> dict[str, float]:
     """
     energy = compared.sampled_energy
     weights = {
-        one.placed_effect.id: log_form_weight(1.0 - one.share, energy, _own_count(one))
+        one.placed_effect.id: log_form_weight(1.0 - one.share, energy, one.parameter_count)
         for one in compared.candidates
         if one.is_fitted
     }
@@ -83,13 +82,6 @@ def candidate_probabilities(compared: Round) -> dict[str, float]:
     masses = {name: math.exp(weight - most) for name, weight in weights.items()}
     whole = sum(masses.values())
     return {name: mass / whole for name, mass in masses.items()}
-
-
-def _own_count(candidate: CandidateFit) -> int:
-    """Return the number of parameters of the effect of a fitted candidate."""
-    own = effect_names(candidate.placed_effect)
-    assert candidate.estimate is not None
-    return sum(name in own for name in candidate.estimate.candidate.names)
 
 
 def select_effects(
@@ -113,7 +105,7 @@ def select_effects(
     best = _best_candidate(model_set, first, thresholds, preferred)
     if best is None:
         return found
-    if best.share < first.least_share:
+    if not first.is_explained_by(best):
         if first.is_ordinary:
             return found
         pair = _select_pair(model_set, found, best, thresholds, log)
@@ -125,7 +117,7 @@ def select_effects(
     is_preferred = found.accepted[0].placed_effect.id in preferred
     while len(found.accepted) < MAX_EFFECTS:
         best = _best_candidate(model_set, found.last, thresholds)
-        if best is None or best.share < found.last.least_share:
+        if best is None or not found.last.is_explained_by(best):
             break
         if is_preferred and best.placed_effect.id not in preferred:
             break
@@ -203,7 +195,7 @@ def _best_candidate(
     enough = [
         one for one in compared.candidates if one.gain >= thresholds.threshold_of(one.placed_effect)
     ]
-    explaining = [one for one in enough if one.share >= compared.least_share]
+    explaining = [one for one in enough if compared.is_explained_by(one)]
     if not explaining:
         return next(iter(enough), None)
     simulating = _explain_simulations(model_set, compared, explaining)
@@ -287,7 +279,7 @@ def _select_pair(
     """Return the selection with two effects that together explain most; else without any."""
     pair = _accept(model_set, found, best, log)
     second = _best_candidate(model_set, pair.last, thresholds)
-    if second is not None and second.share >= pair.last.least_share:
+    if second is not None and pair.last.is_explained_by(second):
         return _accept(model_set, pair, second, log)
     log(f"not accepted {best.placed_effect.id}: it explains {best.share:.0%}")
     return found

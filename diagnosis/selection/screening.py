@@ -69,10 +69,10 @@ def _screen(model_set: ModelSet, base: Estimate, candidate: Candidate) -> Estima
 def _with_orders(
     model_set: ModelSet, base: Estimate, candidate: Candidate, starts: list[dict[str, float]]
 ) -> list[dict[str, float]]:
-    """Return starts in which an order is that of a strong period of the innovations of the base.
+    """Return starts in which an order is the plain one or that of a strong period of innovations.
 
-    The path is the first state that the candidate adds. Without an order, or if the path does not
-    move, the starts are returned.
+    The innovations are those of the base. The path is the first state that the candidate adds.
+    Without an order, or if the path does not move, the starts are returned.
     """
     orders = [one for one in candidate.free_parameters if one.is_order and one.name in starts[0]]
     paths = [
@@ -91,6 +91,8 @@ def _with_orders(
         orders[0].low,
         orders[0].high,
     )
+    if found and orders[0].plain is not None:
+        found = (orders[0].plain, *found)
     return [{**starts[0], orders[0].name: order} for order in found] or starts
 
 

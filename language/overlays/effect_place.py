@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from language.expressions.text_rewrite import split_balance
-from language.expressions.units import RADIAN, SECOND, Dimension, are_compatible
+from language.expressions.units import RADIAN, SECOND, Dimension, are_compatible, parse_unit
 from language.overlays.effect_reader import ELEMENT_PARTS, Effect, PlacePattern
 from language.overlays.name_types import (
     TreeTypes,
@@ -19,6 +19,9 @@ from language.readers.element_reader import outputs_as_mapping
 from language.text.diagnostic import suggest_name
 from language.text.document import MappingNode, ScalarNode
 from language.text.node_edit import mapping_entries, scalars_of
+
+SPEEDS = parse_unit("rad/s").dimension, parse_unit("m/s").dimension
+"""Dimensions of a speed whose integral is a path."""
 
 Hole = str | tuple[str, ...]
 """The text that fills a hole, or several texts."""
@@ -126,8 +129,8 @@ def _find_output(
 ) -> EffectPlace | PlaceMismatch:
     """Return the output `name` as a place with the hole `y`, the variable that it reads.
 
-    The hole `start` is this variable too if a state may start with it, else 0. Returns a mismatch
-    if there is no such output.
+    The hole `start` is this variable too if a state may start with it, else 0. A speed has the
+    units of its path. Returns a mismatch if there is no such output.
     """
     node = tree.get("outputs")
     outputs = outputs_as_mapping(node) if node else MappingNode({}, tree.span)
@@ -140,7 +143,12 @@ def _find_output(
     tables = [table for section in ("states", "inputs") if (table := tree.get(section))]
     is_known = any(isinstance(one, MappingNode) and source.text in one.entries for one in tables)
     start = source.text if is_known else "0"
-    return dataclasses.replace(place, holes={**place.holes, "start": start})
+    speed = known.type_of_name(source.text)
+    is_speed = isinstance(speed, Dimension) and any(are_compatible(speed, one) for one in SPEEDS)
+    if "path" in pattern.has and not is_speed:
+        return PlaceMismatch(f"`{name}` is in `{speed}`: it is no speed")
+    path = _path_units(speed) if isinstance(speed, Dimension) and is_speed else {}
+    return dataclasses.replace(place, holes={**path, **place.holes, "start": start})
 
 
 def _signal_place(

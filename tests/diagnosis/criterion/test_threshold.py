@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -61,4 +62,11 @@ def test_a_file_without_thresholds_is_refused(text: str, told: str, tmp_path: Pa
     path = tmp_path / "thresholds.json"
     path.write_text(text, "utf-8")
     with pytest.raises(ValueError, match=told):
+        read_thresholds(path)
+
+
+def test_a_pipe_holds_no_thresholds(tmp_path: Path) -> None:
+    path = tmp_path / "thresholds.json"
+    os.mkfifo(path)
+    with pytest.raises(ValueError, match="cannot be read as thresholds"):
         read_thresholds(path)

@@ -1,12 +1,14 @@
-"""The most excited part of a recording is found, also in one whose time leaps by years."""
+"""Agreement of recordings with simulations, at any rate; the most excited part of a recording."""
 
 from __future__ import annotations
 
 from fractions import Fraction
 
 import numpy as np
+import pytest
 
-from diagnosis.data_quality.model_agreement import most_excited_piece
+from diagnosis.data_quality.model_agreement import compare_signals, most_excited_piece
+from diagnosis.data_quality.output_comparison import OutputComparison
 from engine.recordings.recording import Channel, Recording
 from tests.diagnosis.small_driveline import read_recording_map
 
@@ -35,3 +37,17 @@ def test_a_leap_of_years_is_no_work() -> None:
     assert len(found.channels[FED.name].times) > 20
     far = recording([10**9 * one for one in times], values)
     assert most_excited_piece(far, LENGTH).start == 0
+
+
+@pytest.mark.parametrize("period", [0.001, 0.5, 1.0, 20.0])
+@pytest.mark.parametrize("late", [0, 40])
+def test_signals_are_compared_in_the_time_of_the_recording(period: float, late: int) -> None:
+    """A process that is sampled each minute has the lags of a minute."""
+    rng = np.random.default_rng(5)
+    moves = np.convolve(rng.normal(size=2200), np.hanning(100), "same")
+    times = period * np.arange(2000)
+    compared = OutputComparison(times, 2.0 * moves[100 - late : 2100 - late], moves[100:2100])
+    found = compare_signals("run.csv", "T", compared)
+    assert found is not None and found.is_clear
+    assert found.gain == pytest.approx(2.0, rel=0.1)
+    assert found.lag == pytest.approx(period * late, abs=3.0 * period)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -50,3 +51,11 @@ def test_a_stored_candidate_is_read_with_all_its_metadata(
     library.write_bytes(b"damaged")
     load_or_compile("key", compile_model)
     assert compiled == ["once", "once"]
+    recipe = tmp_path / "key.json"
+    recipe.write_bytes(recipe.read_bytes().replace(b"600.0", b"700.0"))
+    assert load_or_compile("key", compile_model)[0] == model
+    assert compiled == ["once"] * 3
+    recipe.unlink()
+    os.mkfifo(recipe)
+    assert load_or_compile("key", compile_model)[0] == model
+    assert compiled == ["once"] * 4

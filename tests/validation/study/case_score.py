@@ -69,15 +69,24 @@ class Answer:
         return self.named[0] if self.named else str(self.verdict.get("verdict", "no verdict"))
 
     @property
+    def first(self) -> str:
+        """The first name: of the named effects, or of the set of an ambiguous verdict."""
+        is_set = self.verdict.get("verdict") == "ambiguous"
+        return next(iter(self.named or (self.stated if is_set else ())), "")
+
+    @property
     def stated(self) -> tuple[str, ...]:
         """All effects of the stated set: those named, then those that may be it as well."""
         others = (one["id"] for one in self.verdict.get("ambiguous_with", ()))
         return tuple(dict.fromkeys((*self.named, *others)))
 
     def is_named(self, is_strict: bool = False) -> bool:
-        """Return whether the first name is right, or each name of an ambiguous verdict."""
-        names = self.named[:1] or self.stated
-        return bool(names) and set(names) <= self.right(is_strict)
+        """Return whether the first name is right."""
+        return self.first in self.right(is_strict)
+
+    def is_alone_named(self, is_strict: bool = False) -> bool:
+        """Return whether the first name is right and the verdict does not leave it open."""
+        return self.is_named(is_strict) and self.said != "ambiguous"
 
     def is_stated(self, is_strict: bool = False) -> bool:
         """Return whether a right name is in the stated set."""

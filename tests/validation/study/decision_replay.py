@@ -53,9 +53,10 @@ def verdict_probabilities(decision: Mapping[str, Any]) -> dict[str, float]:
     If no candidate gains and explains enough and the energy is ordinary, nothing is missing with
     certainty; else the masses of the comparison count.
     """
-    least, candidates = explained_share.least_share(), decision["candidates"]
+    candidates = decision["candidates"]
     is_named = any(
-        (one["gain"] or 0.0) >= DEFAULT_THRESHOLD and (one["share"] or 0.0) >= least
+        (one["gain"] or 0.0) >= DEFAULT_THRESHOLD
+        and (one["share"] or 0.0) >= explained_share.least_share(parameters=one["parameters"])
         for one in candidates
     )
     energy = math.inf if decision["energy"] is None else decision["energy"]

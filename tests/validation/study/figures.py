@@ -129,6 +129,10 @@ _share = partial(Figure, statistic=_mean)
 FIGURES = (
     _share("first name right", ">= 88 %", ("full",), lambda a, s: a.is_named(s), has_names=True),
     _share(
+        "first name right in a verdict that is not `ambiguous`", "", ("full",),
+        lambda a, s: a.is_alone_named(s), has_names=True,
+    ),
+    _share(
         "right name in the stated set", ">= 95 %", ("full",), lambda a, s: a.is_stated(s),
         has_names=True,
     ),

@@ -63,10 +63,17 @@ def test_a_name_is_right_if_the_first_one_is_an_effect_of_the_case() -> None:
     assert second.is_stated() and not second.is_placed
 
 
-def test_an_ambiguous_verdict_names_nothing_but_states_a_set() -> None:
+def test_the_first_name_of_an_ambiguous_verdict_is_the_first_of_its_set() -> None:
     found = answer(("tyre_slip",), verdict("tyre_slip", "road_grade", says="ambiguous"))
-    assert not found.is_named() and found.is_stated() and found.said == "ambiguous"
+    assert found.is_named() and not found.is_alone_named() and found.said == "ambiguous"
     assert found.stated == ("tyre_slip", "road_grade")
+    second = answer(("tyre_slip",), verdict("road_grade", "tyre_slip", says="ambiguous"))
+    assert not second.is_named() and second.is_stated()
+
+
+def test_a_verdict_that_nothing_explains_has_no_first_name() -> None:
+    unknown = answer(("tyre_slip",), verdict(says="unknown"))
+    assert not unknown.is_named() and not unknown.is_alone_named() and unknown.first == ""
 
 
 def test_no_verdict_is_an_alarm() -> None:
@@ -80,7 +87,7 @@ def test_accepted_names_are_right_unless_the_score_is_strict() -> None:
     assert answer(*given, "driveline_b").is_named()
     assert not answer(*given, "driveline_b").is_named(is_strict=True)
     assert not answer(*given, "open_cases").is_named()
-    both = verdict("coulomb_friction", "stribeck_friction", says="ambiguous")
+    both = verdict("stribeck_friction", "coulomb_friction", says="ambiguous")
     assert answer(given[0], both, "full", "driveline_b").is_named()
     assert not answer(given[0], both, "full", "driveline_b").is_named(is_strict=True)
     assert right_names("open_cases", "tyre_slip") == {"tyre_slip"}
