@@ -24,16 +24,17 @@ def integrated_autocorrelation(model: Estimate, series: Sequence[SampledRecordin
     Squared autocorrelations apply to quadratic functions such as log-likelihoods (Bartlett 1946).
     """
     lags = round(float(np.median([one.sample_count(MAX_LAG) for one in series])))
-    return _integrated_autocorrelation(model.prediction.innovations, lags)
+    return autocorrelation_sum(model.prediction.innovations, lags)
 
 
-def _integrated_autocorrelation(innovations: Sequence[Reals], lags: int) -> float:
-    """Return the integrated autocorrelation over some recordings;
-    unknown innovations are dropped.
+def autocorrelation_sum(signals: Sequence[Reals], lags: int) -> float:
+    """Return 1 + 2 times the sum of squared autocorrelations up to `lags`, the mean over columns.
+
+    `signals` (samples, columns) have one array per recording; unknown values are dropped.
     """
     by_output = []
-    for channel in range(innovations[0].shape[1]):
-        by_recording = [e[np.isfinite(e[:, channel]), channel] for e in innovations]
+    for channel in range(signals[0].shape[1]):
+        by_recording = [e[np.isfinite(e[:, channel]), channel] for e in signals]
         power = sum(float(e @ e) for e in by_recording)
         total = 1.0
         for lag in range(1, lags + 1) if power > 0.0 else ():

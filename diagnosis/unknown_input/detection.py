@@ -7,10 +7,12 @@ the time and independent of what is known.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from diagnosis.criterion.effective_sample_size import autocorrelation_sum
 from diagnosis.data.array_types import Reals
 from diagnosis.data.noise_estimate import MAD_TO_STD
 from diagnosis.estimation.estimate import Estimate, with_normal_equations
@@ -31,8 +33,13 @@ from diagnosis.unknown_input.inactive_interval import refit_on_inactive_interval
 
 ENERGY_FRACTION = 0.8
 """Part of the squares of a disturbance that its largest samples have."""
-MAX_ACTIVE_FRACTION = 0.22
-"""Largest part of all samples that these are, for an input that acts in windows."""
+GAUSSIAN_FRACTION, GAUSSIAN_FRACTION_STD = 0.316, 0.286
+"""Part of the samples of a normal disturbance that these are, and its standard deviation for one
+independent sample."""
+SURE_STDS = 3.0
+"""Standard deviations by which the part must be smaller, for an input that acts in windows."""
+MEMORY = 10.0
+"""Reference times up to which the samples of a disturbance are correlated."""
 NEAR_BEST_FRACTION = 0.9
 """Part of the largest gain of a place from which another one may be that of the input."""
 MAX_EXPLAINED_SHARE = 0.5
@@ -53,13 +60,13 @@ def detect_unknown_input(
 ) -> tuple[Selection, tuple[Location, ...]]:
     """Return the selection with an unknown input, and the locations with its time course.
 
-    It is tried at the balances whose free disturbances gain most, if more than an ordinary
-    disturbance is left and no effect explains half of that. Both arguments are returned if the
-    disturbance does not act in windows.
+    It is tried at the balances whose free disturbances gain most, if the base leaves more than a
+    negligible energy. Beside accepted effects more than an ordinary disturbance must be left, of
+    which no effect explains half. Both arguments are returned if the disturbance does not act in
+    windows.
     """
     effects = _unknown_input_effects(model_set)
-    explained = max((one.share for one in selection.last.candidates if one.gain > 0.0), default=0.0)
-    if selection.last.is_ordinary or explained > MAX_EXPLAINED_SHARE or not effects:
+    if not effects or not _leaves_an_input(selection):
         return selection, tuple(locations)
     remaining = localise(model_set, selection.model) if selection.accepted else tuple(locations)
     place = _find_place(model_set, remaining, effects)
@@ -79,6 +86,15 @@ def detect_unknown_input(
     return selection, (refitted, *(one for one in locations if one.path != place.path))
 
 
+def _leaves_an_input(selection: Selection) -> bool:
+    """Return whether a selection leaves enough for an unknown input."""
+    last = selection.last
+    if not selection.accepted:
+        return not last.is_negligible
+    explained = max((one.share for one in last.candidates if one.gain > 0.0), default=0.0)
+    return not last.is_ordinary and explained <= MAX_EXPLAINED_SHARE
+
+
 def _find_place(
     model_set: ModelSet, locations: Sequence[Location], effects: Mapping[str, PlacedEffect]
 ) -> Location | None:
@@ -96,7 +112,8 @@ def _is_unknown_input(model_set: ModelSet, location: Location) -> bool:
     """Return whether the disturbance at a place acts in windows and depends on nothing known."""
     values = [one.values for one in location.disturbances]
     follows = any(abs(r) > MAX_CORRELATION for _, r in location.correlates)
-    if follows or not is_intermittent(values):
+    lags = round(float(np.median([one.sample_count(MEMORY) for one in model_set.series])))
+    if follows or not is_intermittent(values, lags):
         return False
     return (
         input_dependence(model_set.series, values) < MAX_INPUT_DEPENDENCE
@@ -135,10 +152,17 @@ def _with_free_model(model_set: ModelSet, location: Location, free_model: Estima
     return with_smoothed_disturbances(model_set, location)
 
 
-def is_intermittent(disturbances: Sequence[Reals]) -> bool:
-    """Return whether a disturbance is small most of the time."""
+def is_intermittent(disturbances: Sequence[Reals], lags: int) -> bool:
+    """Return whether a disturbance is small for longer than a normal process is by chance.
+
+    Its samples are correlated up to `lags`. A normal process that is as correlated has most of its
+    squares in about a third of the time.
+    """
     whole = np.abs(np.concatenate(disturbances))
-    return bool(np.mean(whole >= _energy_level(disturbances)) < MAX_ACTIVE_FRACTION)
+    correlation = autocorrelation_sum([one[:, np.newaxis] for one in disturbances], lags)
+    spread = GAUSSIAN_FRACTION_STD * math.sqrt(correlation / len(whole))
+    least = GAUSSIAN_FRACTION - SURE_STDS * spread
+    return bool(np.mean(whole >= _energy_level(disturbances)) < least)
 
 
 def _energy_level(disturbances: Sequence[Reals]) -> float:
