@@ -73,19 +73,20 @@ def sampled_energy(base: Estimate, floor: Reals, correlation: float) -> float:
     return float(np.sum(base.prediction.counts * excess)) / correlation
 
 
-def least_share(energy: float = math.inf, parameters: int = 0) -> float:
+def least_share(energy: float = math.inf, parameters: int = 1) -> float:
     """Return the explained share from which an effect is more probable than an unknown disturbance.
 
-    It is where both have the same `log_form_weight`: 0.70 without noise and parameters, less for a
-    small `sampled_energy`, more for an effect with `parameters`; infinite if no share is enough.
+    It is where both have the same `log_form_weight`: 0.70 without noise for one parameter, less for
+    a small `sampled_energy`, more for an effect with more `parameters`; infinite if no share is
+    enough.
     """
     unknown = log_form_weight(None, energy)
 
     def advantage(remaining: float) -> float:
         return log_form_weight(remaining, energy, parameters) - unknown
 
-    if advantage(0.0) <= 0.0:
-        return math.inf if parameters else 0.0
+    if advantage(0.0) < 0.0:
+        return math.inf
     return 1.0 - float(brentq(advantage, 0.0, 1.0)) if advantage(1.0) < 0.0 else 0.0
 
 
@@ -96,16 +97,18 @@ def log_form_weight(remaining: float | None, energy: float, parameters: int = 0)
     relative to the effect, has a uniform logarithm from `LEAST_FORM_ERROR` (0.01) to `FORM_ERROR`
     (0.4). The noise adds FORM_SAMPLES / energy to their variance; `energy` is the `sampled_energy`
     of the base. None for `remaining` gives the weight of an unknown disturbance, whose variance is
-    the one that fits best. Each of the `parameters` of the effect costs log(FORM_SAMPLES) / 2.
+    the one that fits best. Each of the `parameters` of the effect, and this variance, costs
+    log(FORM_SAMPLES) / 2.
     """
     noise = FORM_SAMPLES / max(energy, 1.0)
+    price = math.log(FORM_SAMPLES) / 2.0
     if remaining is None:
-        return -FORM_SAMPLES / 2.0 * (math.log(1.0 + noise) + 1.0)
+        return -FORM_SAMPLES / 2.0 * (math.log(1.0 + noise) + 1.0) - price
     ends = np.geomspace(LEAST_FORM_ERROR, FORM_ERROR)
     variances = ends[1:] * ends[:-1] + noise
     misfits = np.log(variances) + (max(remaining, 0.0) + noise) / variances
     mass = float(np.logaddexp.reduce(-FORM_SAMPLES / 2.0 * misfits)) - math.log(len(variances))
-    return mass - parameters / 2.0 * math.log(FORM_SAMPLES)
+    return mass - parameters * price
 
 
 MIN_SHARE = least_share()

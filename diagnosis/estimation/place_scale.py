@@ -89,13 +89,16 @@ def correlation_time(signals: Sequence[Reals], period: float) -> float:
 def _magnitudes(
     model_set: ModelSet, base: Estimate, place: str, texts: Mapping[str, str]
 ) -> dict[str, float]:
-    """Return inertia, rate, load, stretch and level of a place whose holes have given texts."""
+    """Return inertia, rate, least magnitude, load, stretch and level of a place whose holes have
+    given texts.
+    """
     found: dict[str, float] = {}
     if "inertia" in texts:
         found["inertia"] = abs(coefficient_value(model_set, base, texts["inertia"]) or 0.0)
     rate = texts.get("x") or texts.get("speed", "")
     turning = rate or texts.get("angle_rate") or texts.get("rate", "")
     found["rate"] = _level(_states(base, model_set, turning))
+    found["least"] = _least(_states(base, model_set, texts.get("x", "")))
     if "twist" in texts:
         found["load"] = acting_rms(model_set, "elements", place, base)
         stiffness = coefficient_value(model_set, base, texts.get("stiffness", ""))
@@ -141,6 +144,13 @@ def _states(base: Estimate, model_set: ModelSet, name: str) -> list[Reals]:
     runs = zip(model_set.series, base.prediction.predictions, strict=True)
     column = states.index(name)
     return [run.states[burn_in_samples(one) : run.completed, column] for one, run in runs]
+
+
+def _least(signals: Sequence[Reals]) -> float:
+    """Return the least magnitude of a signal over recordings; 0 if it changes its sign."""
+    low = min((float(np.min(one)) for one in signals if len(one)), default=0.0)
+    high = max((float(np.max(one)) for one in signals if len(one)), default=0.0)
+    return min(abs(low), abs(high)) if low * high > 0.0 else 0.0
 
 
 def _level(signals: Sequence[Reals]) -> float:

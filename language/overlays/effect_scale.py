@@ -31,12 +31,12 @@ from language.text.document import Entry, MappingNode, ScalarNode, SequenceNode,
 from language.text.node_edit import mapping_entries, put_node, scalars_of
 
 SCALE_NAMES = (
-    *("load", "rate", "inertia", "stretch"),
+    *("load", "rate", "least", "inertia", "stretch"),
     *("level", "time", "response", "period", "horizon"),
 )
-"""Magnitudes [SI] of a place: force, speed and inertia of a balance or element, deflection of a
-spring, value of a signal, correlation time of the signal, time constant of the model, sample
-period, length of a recording."""
+"""Magnitudes [SI] of a place: force and speed of a balance or element, least magnitude of the state
+of a balance, inertia, deflection of a spring, value of a signal, correlation time of the signal,
+time constant of the model, sample period, length of a recording."""
 QUANTITY_KEYS = ("value", "range", "neutral", "plain", "starts")
 """Keys of a parameter whose numbers are multiples."""
 

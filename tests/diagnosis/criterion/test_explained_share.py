@@ -106,14 +106,14 @@ def test_an_effect_that_leaves_nothing_is_more_probable_than_an_unknown_disturba
 
 
 def test_at_the_least_share_an_effect_and_an_unknown_disturbance_weigh_the_same() -> None:
-    assert log_form_weight(1.0 - MIN_SHARE, LARGE) == pytest.approx(log_form_weight(None, LARGE))
+    assert log_form_weight(1.0 - MIN_SHARE, LARGE, 1) == pytest.approx(log_form_weight(None, LARGE))
     for more, is_better in ((0.01, False), (-0.01, True)):
-        weight = log_form_weight(1.0 - MIN_SHARE + more, LARGE)
+        weight = log_form_weight(1.0 - MIN_SHARE + more, LARGE, 1)
         assert (weight > log_form_weight(None, LARGE)) is is_better
 
 
 def test_a_tiny_gain_separates_nothing() -> None:
-    weights = [log_form_weight(part, 0.0) for part in (0.0, 0.5, 1.0)]
+    weights = [log_form_weight(part, 0.0, 1) for part in (0.0, 0.5, 1.0)]
     assert max(weights) - min(weights) < 1.0
     assert abs(max(weights) - log_form_weight(None, 0.0)) < 1.0
 
