@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from diagnosis.estimation.covariance import quantities_of
 from diagnosis.pipeline.parameter_fit import parameter_note
 from diagnosis.report.diagnosis_report import DiagnosisReport
@@ -16,22 +14,11 @@ MIN_BIAS, MIN_BIAS_STDS, MAX_BIASED = 0.03, 3.0, 5
 """Relative bias and standard deviations from which parameters are biased; how many are named."""
 
 
-@dataclass(frozen=True)
-class ParameterRow:
-    """A parameter, its values and its change from the declared value, as texts."""
+def parameter_rows(report: DiagnosisReport, selection: Selection) -> list[tuple[str, ...]]:
+    """Return the rows of the parameters of the final model.
 
-    name: str
-    unit: str
-    declared: str
-    before: str
-    after: str
-    change: str
-    about: str
-    note: str
-
-
-def parameter_rows(report: DiagnosisReport, selection: Selection) -> list[ParameterRow]:
-    """Return declared, recalibrated and final value of each parameter of the final model."""
+    They have name, unit, declared, recalibrated and final value, change, description and note.
+    """
     before, after = quantities_of(selection.base), quantities_of(selection.model)
     effect_abouts = {
         tried.placed_effect.qualified_name(entry.key): entry.node.text_of("about")
@@ -40,12 +27,12 @@ def parameter_rows(report: DiagnosisReport, selection: Selection) -> list[Parame
         if isinstance(entry.node, MappingNode)
     }
     coordinates = {one.name: one for one in selection.model.candidate.free_parameters}
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for name, now in after.items():
         declared = report.automaton.parameters.get(name)
         value = None if declared is None or declared.value is None else float(declared.value)
         rows.append(
-            ParameterRow(
+            (
                 name,
                 "" if now.unit == "1" else now.unit,
                 "new" if value is None else f"{value:.5g}",

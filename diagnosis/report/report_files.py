@@ -35,8 +35,6 @@ from diagnosis.report.reproduction import (
     reproduction_commands,
 )
 from diagnosis.report.summary_cards import summary_cards
-from diagnosis.report.tables import describe_residuals, whiteness_rows
-from language.overlays.name_types import format_si_unit
 from language.text.diagnostic import MissingToolError
 
 REPORT = __name__.rpartition(".")[0]
@@ -93,12 +91,10 @@ def report_files(report: DiagnosisReport, variant: str, folder: Path = Path()) -
         files[f"{one.name}.svg"] = one.picture.data("svg")
         files[f"{one.name}.png"] = one.picture.data("png")
     if comparisons:
-        inputs = {n: format_si_unit(i.unit.dimension) for n, i in report.automaton.inputs.items()}
-        files[WINDOW] = format_window_csv(comparisons[0].window, inputs).encode()
-        files[SCENARIO] = format_scenario(report, comparisons[0].window).encode()
-    svg = {one.name: embed_svg(one, files[f"{one.name}.svg"]) for one in figures}
+        files[WINDOW] = format_window_csv(report.automaton, comparisons[0]).encode()
+        files[SCENARIO] = format_scenario(report, comparisons[0]).encode()
     context = {
-        **_verdict_context(report, comparisons),
+        **_verdict_context(report),
         **_model_context(report, comparisons),
         **_data_context(report),
         "commands": reproduction_commands(report, folder),
@@ -107,7 +103,7 @@ def report_files(report: DiagnosisReport, variant: str, folder: Path = Path()) -
         "sources": provenance_rows(report),
         "variant": variant,
         "drawings": {one.name: one for one in figures},
-        "svg": svg,
+        "svg": {one.name: embed_svg(one, files[f"{one.name}.svg"]) for one in figures},
     }
     files["report.html"] = render_html((REPORT,), "report.html.jinja", context).encode()
     verdict = json.dumps(verdict_to_json(report.verdict), indent=2, allow_nan=False) + "\n"
@@ -115,10 +111,8 @@ def report_files(report: DiagnosisReport, variant: str, folder: Path = Path()) -
     return files
 
 
-def _verdict_context(
-    report: DiagnosisReport, comparisons: Sequence[ModelComparison]
-) -> dict[str, Any]:
-    """Return the values of the template for the verdict, the cards and the changed equations."""
+def _verdict_context(report: DiagnosisReport) -> dict[str, Any]:
+    """Return the values of the template for the verdict and the changed equations."""
     verdict, found = report.verdict, report.diagnosis
     placed_effects = [one.placed_effect for one in found.selection.accepted] if found else []
     effects = [one.effect for one in placed_effects]
@@ -129,44 +123,36 @@ def _verdict_context(
         "has_model": bool(placed_effects),
         "laid": [placed_effect.id for placed_effect in placed_effects],
         "headline": tables.split_code_spans(sentences.format_headline(report)),
-        "cards": summary_cards(report, comparisons[0].after if comparisons else ()),
-        "location": sentences.format_missing_location(report) if found else "",
+        "location": sentences.format_missing_location(report),
         "messages": verdict.messages,
         "abouts": [(one.name.replace("_", " "), one.about, one.signature) for one in effects],
         "changes": equation_changes(report.case.document, placed_effects),
         "places": tables.location_rows(verdict.location[0]) if verdict.location else [],
         "rivals": [sentences.format_effect(one) for one in verdict.ambiguous_with],
         "separation": sentences.format_separation(report),
-        "signals": list(zip(comparisons[0].runs.signals, comparisons[0].units, strict=True))
-        if comparisons
-        else [],
     }
 
 
 def _model_context(
     report: DiagnosisReport, comparisons: Sequence[ModelComparison]
 ) -> dict[str, Any]:
-    """Return the values of the template for misfits, candidates, parameters and residuals."""
-    found = report.diagnosis
-    if found is None:
-        return {"fit": [], "candidates": [], "unfitted": [], "parameters": [], "whiteness": []}
-    selection = found.selection
-    one = comparisons[0]
+    """Return the values of the template for cards, misfits, candidates, parameters, residuals."""
+    if report.diagnosis is None:
+        return dict.fromkeys(("cards", "fit", "candidates", "unfitted", "parameters", "whiteness"))
+    selection, first = report.diagnosis.selection, comparisons[0]
     return {
-        "fit": [
-            row
-            for s in comparisons
-            for row in tables.misfit_rows(report, s.label, s.dataset, s.runs)
-        ],
-        "noise": tables.format_noise(selection, one.runs.signals, one.units),
+        "cards": summary_cards(report, first.models[-1].whiteness),
+        "signals": list(zip(first.signals, first.units, strict=True)),
+        "fit": [row for one in comparisons for row in tables.misfit_rows(report, one)],
+        "noise": tables.format_noise(selection, first),
         "candidates": tables.candidate_rows(report, selection),
         "unfitted": tables.unfitted_candidates(report, selection),
         "other": format_probability(report.verdict.other),
         "parameters": parameter_rows(report, selection),
         "astray": format_biased_parameters(selection),
-        "whiteness": whiteness_rows(one.before, one.after, one.units, not selection.accepted),
-        "whiteness_of": one.label,
-        "left": describe_residuals(one.before, one.after, not selection.accepted),
+        "whiteness": tables.whiteness_rows(first),
+        "whiteness_of": first.label,
+        "left": tables.describe_residuals(first),
     }
 
 
