@@ -17,10 +17,10 @@ from diagnosis.model.compile_cache import node_text
 from diagnosis.model.effect_library import equation_changes
 from diagnosis.model.placed_effect import shipped_effects
 from diagnosis.report import report_text as sentences, tables
-from diagnosis.report.diagnosis_report import DiagnosisReport, verdict_to_json
+from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.figures import embed_svg, report_figures
 from diagnosis.report.model_comparison import ModelComparison, compare_models
-from diagnosis.report.number_text import format_probability
+from diagnosis.report.number_text import format_percent, format_probability, format_significant
 from diagnosis.report.parameter_table import (
     format_biased_parameters,
     format_fixed_parameters,
@@ -106,7 +106,7 @@ def report_files(report: DiagnosisReport, variant: str, folder: Path = Path()) -
         "svg": {one.name: embed_svg(one, files[f"{one.name}.svg"]) for one in figures},
     }
     files["report.html"] = render_html((REPORT,), "report.html.jinja", context).encode()
-    verdict = json.dumps(verdict_to_json(report.verdict), indent=2, allow_nan=False) + "\n"
+    verdict = json.dumps(report.verdict.to_json(), indent=2, allow_nan=False) + "\n"
     files["verdict.json"] = verdict.encode()
     return files
 
@@ -138,21 +138,20 @@ def _model_context(
 ) -> dict[str, Any]:
     """Return the values of the template for cards, misfits, candidates, parameters, residuals."""
     if report.diagnosis is None:
-        return dict.fromkeys(("cards", "fit", "candidates", "unfitted", "parameters", "whiteness"))
+        return dict.fromkeys(("cards", "fit", "candidates", "parameters"))
     selection, first = report.diagnosis.selection, comparisons[0]
     return {
         "cards": summary_cards(report, first.models[-1].whiteness),
-        "signals": list(zip(first.signals, first.units, strict=True)),
+        "compared": first,
+        "noise": [format_significant(float(sd), 2) for sd in selection.base.noise_levels.outputs],
+        "significant": format_significant,
+        "percent": format_percent,
         "fit": [row for one in comparisons for row in tables.misfit_rows(report, one)],
-        "noise": tables.format_noise(selection, first),
         "candidates": tables.candidate_rows(report, selection),
         "unfitted": tables.unfitted_candidates(report, selection),
         "other": format_probability(report.verdict.other),
         "parameters": parameter_rows(report, selection),
         "astray": format_biased_parameters(selection),
-        "whiteness": tables.whiteness_rows(first),
-        "whiteness_of": first.label,
-        "left": tables.describe_residuals(first),
     }
 
 

@@ -152,46 +152,6 @@ def untestable_effects(report: DiagnosisReport) -> list[tuple[str, str]]:
     return [(needs, ", ".join(names)) for needs, names in lacking.items()]
 
 
-def format_noise(selection: Selection, comparison: ModelComparison) -> str:
-    """Return the noise of the recorded signals in the base: `w 0.12 rad/s, T 3.0 N*m`."""
-    noise = [format_significant(float(sd), 2) for sd in selection.base.noise_levels.outputs]
-    parts = zip(comparison.signals, noise, comparison.units, strict=True)
-    return ", ".join(f"{name} {sd} {unit}" for name, sd, unit in parts)
-
-
 def split_code_spans(text: str) -> list[tuple[str, bool]]:
     """Return the parts of a sentence between back quotes, with whether each was quoted."""
     return [(part, place % 2 == 1) for place, part in enumerate(text.split("`"))]
-
-
-def whiteness_rows(comparison: ModelComparison) -> list[tuple[str, ...]]:
-    """Return signal, model, rms, predictable fraction, lags outside, p-value and rating.
-
-    There is a row for each signal and model, the base first.
-    """
-    rows: list[tuple[str, ...]] = []
-    for k, unit in enumerate(comparison.units):
-        for model in comparison.models:
-            one = model.whiteness[k]
-            chance = "< 0.001" if one.p_value < 0.001 else f"{one.p_value:.2g}"
-            size = f"{format_significant(one.rms)} {unit}"
-            part = format_percent(one.predictable_fraction)
-            outside = f"{one.lags_outside_band} of {len(one.lags)}"
-            rows.append((one.signal, model.label, size, part, outside, chance, one.rating))
-    return rows
-
-
-def describe_residuals(comparison: ModelComparison) -> list[tuple[str, str]]:
-    """Return each signal with the rating and the predictable fraction of what is left."""
-    ratings = {
-        "white": "noise",
-        "nearly white": "next to nothing but noise",
-        "coloured": "not noise alone: something else is still missing, or slow",
-    }
-    found = []
-    for tests in zip(*(model.whiteness for model in comparison.models), strict=True):
-        *before, left = [format_percent(one.predictable_fraction) for one in tests]
-        was = f" (without {before[0]})" if before else ""
-        text = f"{ratings[tests[-1].rating]}; {left} of it is predictable from its past{was}"
-        found.append((tests[-1].signal, text))
-    return found
