@@ -129,6 +129,15 @@ class Excitation:
         idle = [not signal.steps and signal.band == 0.0 for signal in self.inputs]
         return bool(idle) and all(idle)
 
+    @property
+    def untestable(self) -> dict[str, list[str]]:
+        """The effects that cannot be tested, by the needs that are not met, in words."""
+        found: dict[str, list[str]] = {}
+        for one in self.effects:
+            if one.lacking:
+                found.setdefault(" and ".join(one.lacking), []).append(one.effect)
+        return found
+
 
 def analyse_excitation(
     recordings: Sequence[Recording], checks: Sequence[ChannelCheck]

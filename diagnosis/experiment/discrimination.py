@@ -79,9 +79,9 @@ def plan_experiment(
     options = []
     for manoeuvre in manoeuvres_for(model_set):
         simulated = [_simulate_outputs(model, manoeuvre.series) for _, model in some]
-        if any(one is None for one in simulated):
+        runs = [run for run in simulated if run is not None]
+        if len(runs) < len(some):
             continue
-        runs = [one for one in simulated if one is not None]
         nats = [
             _expected_log_bayes_factor(model, model_set.series, manoeuvre.series, run)
             for k, (_, model) in enumerate(some)

@@ -37,6 +37,10 @@ MODEL_STYLES = {
     "with": (BLUE, "-", "simulated with it"),
 }
 """Colour, style and legend of the simulation by a model of a comparison."""
+OSCILLATION_STYLES = (
+    ("--", RED, "simulated, recalibrated"),
+    ("-", BLUE, "simulated, with what was found"),
+)
 
 
 def draw_locations(locations: Sequence[Location]) -> Picture:
@@ -139,13 +143,7 @@ def draw_oscillation(oscillations: Sequence[Oscillation], unit: str) -> Picture:
     axis = figure.subplots()
     first = oscillations[0].recorded
     axis.semilogx(first.amplitudes, first.frequencies, "o", color="black", ms=4, label="recorded")
-    for one, style, colour, label in zip(
-        oscillations,
-        ("--", "-"),
-        (RED, BLUE),
-        ("simulated, recalibrated", "simulated, with what was found"),
-        strict=False,
-    ):
+    for one, (style, colour, label) in zip(oscillations, OSCILLATION_STYLES, strict=False):
         own = one.simulated
         axis.semilogx(own.amplitudes, own.frequencies, style, color=colour, lw=1.4, label=label)
     text = escape_invisible(f"amplitude of a cycle of {oscillations[0].signal} [{unit}]")

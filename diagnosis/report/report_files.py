@@ -21,11 +21,6 @@ from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.figures import embed_svg, report_figures
 from diagnosis.report.model_comparison import ModelComparison, compare_models
 from diagnosis.report.number_text import format_percent, format_probability, format_significant
-from diagnosis.report.parameter_table import (
-    format_biased_parameters,
-    format_fixed_parameters,
-    parameter_rows,
-)
 from diagnosis.report.reproduction import (
     SCENARIO,
     WINDOW,
@@ -96,7 +91,15 @@ def report_files(report: DiagnosisReport, variant: str, folder: Path = Path()) -
     context = {
         **_verdict_context(report),
         **_model_context(report, comparisons),
-        **_data_context(report),
+        "unread": report.diagnosis.unread if report.diagnosis else (),
+        "findings": [
+            (severity, tables.split_code_spans(text))
+            for severity, text in format_findings(report.findings)
+        ],
+        "recordings": tables.recording_rows(report),
+        "untestable": report.check.excitation.untestable,
+        "fixed": tables.format_fixed_parameters(report),
+        "thresholds": report.case.thresholds,
         "commands": reproduction_commands(report, folder),
         "made_by": report_command(report, folder),
         "tools": tool_versions(),
@@ -150,20 +153,6 @@ def _model_context(
         "candidates": tables.candidate_rows(report, selection),
         "unfitted": tables.unfitted_candidates(report, selection),
         "other": format_probability(report.verdict.other),
-        "parameters": parameter_rows(report, selection),
-        "astray": format_biased_parameters(selection),
-    }
-
-
-def _data_context(report: DiagnosisReport) -> dict[str, Any]:
-    """Return the values of the template for the recordings and their findings."""
-    return {
-        "unread": report.diagnosis.unread if report.diagnosis else (),
-        "findings": [
-            (s, tables.split_code_spans(text)) for s, text in format_findings(report.findings)
-        ],
-        "recordings": tables.recording_rows(report),
-        "untestable": tables.untestable_effects(report),
-        "fixed": format_fixed_parameters(report),
-        "thresholds": report.case.thresholds,
+        "parameters": tables.parameter_rows(report, selection),
+        "astray": tables.format_biased_parameters(selection),
     }
