@@ -81,7 +81,7 @@ def check_channel(recording: Recording, channel: Channel) -> ChannelCheck:
         name=channel.column.name,
         signal=channel.column.to or channel.column.compare or channel.column.name,
         unit=channel.column.unit.text,
-        factor=float(channel.column.unit.factor * channel.column.scale[0]),
+        factor=si_factor(channel),
         samples=len(values),
         start=float(times[0]),
         end=float(times[-1]),
@@ -97,6 +97,11 @@ def check_channel(recording: Recording, channel: Channel) -> ChannelCheck:
         clipped=_clipped_fraction(values, quantum, noise),
         stuck=_stuck_interval(times, values, quantum, noise),
     )
+
+
+def si_factor(channel: Channel) -> float:
+    """Return the factor from the unit of the file to SI."""
+    return float(channel.column.unit.factor * channel.column.scale[0])
 
 
 def channel_findings(check: ChannelCheck, is_compared: bool) -> list[Finding]:

@@ -129,6 +129,15 @@ class Excitation:
         idle = [not signal.steps and signal.band == 0.0 for signal in self.inputs]
         return bool(idle) and all(idle)
 
+    @property
+    def untestable(self) -> dict[str, list[str]]:
+        """The effects that cannot be tested, by the needs that are not met, in words."""
+        found: dict[str, list[str]] = {}
+        for one in self.effects:
+            if one.lacking:
+                found.setdefault(" and ".join(one.lacking), []).append(one.effect)
+        return found
+
 
 def analyse_excitation(
     recordings: Sequence[Recording], checks: Sequence[ChannelCheck]
@@ -171,11 +180,7 @@ def _with_derived_speeds(piece: Recording) -> Recording:
         return piece
     found = dict(piece.channels)
     for name, channel in piece.channels.items():
-        per = [
-            parse_unit(f"{text}/s")
-            for text in POSITIONS
-            if are_compatible(column_dimension(channel.column), parse_unit(text).dimension)
-        ]
+        per = [parse_unit(f"{text}/s") for text in POSITIONS if _has_dimension_of(channel, text)]
         if per and len(channel.values) > 2:
             column = replace(channel.column, unit=per[0], to=None, scale=(Fraction(1), PURE_NUMBER))
             rate = np.gradient(channel.array, channel.seconds)
@@ -185,8 +190,12 @@ def _with_derived_speeds(piece: Recording) -> Recording:
 
 def is_speed(channel: Channel) -> bool:
     """Return whether the dimension of a channel's unit is that of rad/s or m/s."""
-    dimension = column_dimension(channel.column)
-    return any(are_compatible(dimension, parse_unit(text).dimension) for text in SPEEDS)
+    return any(_has_dimension_of(channel, text) for text in SPEEDS)
+
+
+def _has_dimension_of(channel: Channel, unit: str) -> bool:
+    """Return whether the dimension of a channel is that of a unit."""
+    return are_compatible(column_dimension(channel.column), parse_unit(unit).dimension)
 
 
 def _signal_excitation(

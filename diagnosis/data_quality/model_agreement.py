@@ -16,6 +16,7 @@ import numpy as np
 from diagnosis.data.array_types import Reals
 from diagnosis.data.sampled_recording import REFERENCE_TIME, reference_time
 from diagnosis.data_quality.output_comparison import OutputComparison, ReferenceModel
+from diagnosis.estimation.place_magnitude import rms
 from engine.recordings.recording import Channel, Recording, crop, split_by_windows
 
 GRID_STEP = 0.05
@@ -213,7 +214,7 @@ def compare_signals(
     gains = [min(max(ratio, 1e-6), 1e6) for ratio in ratios]
     gain = math.copysign(min(gains, key=lambda g: abs(math.log(g))), correlations[best])
     late = times > 0.5 * (start + end)
-    level = _rms(comparison.measured[late]) / max(_rms(comparison.simulated[late]), 1e-12)
+    level = rms(comparison.measured[late]) / max(rms(comparison.simulated[late]), 1e-12)
     both = correlations[best], correlations[0]
     return OutputAgreement(recording, name, gain, best * step, *both, level, unit)
 
@@ -229,11 +230,6 @@ def _low_frequency_rates(
     times, spread = comparison.times, GAIN_SMOOTHING_STD
     measured = _smoothed_rate(times, comparison.measured, shifted[kept], spread)
     return [(measured, _smoothed_rate(times, comparison.simulated, grid[kept], spread))]
-
-
-def _rms(values: Reals) -> float:
-    """Return the root mean square."""
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _overlap(measured: Reals, simulated: Reals, lag: int) -> tuple[Reals, Reals]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.data.array_types import Reals
 from diagnosis.data.noise_estimate import MAD_TO_STD
+from diagnosis.data_quality.channel import si_factor
 from diagnosis.data_quality.finding import Finding
 from engine.recordings.recording import Channel, Recording, split_by_windows
 from language.model.automaton import Automaton
@@ -56,7 +57,7 @@ def find_outliers(recording: Recording, automaton: Automaton | None) -> list[Fin
         if not far.any():
             continue
         worst = int(np.argmax(np.where(far, np.abs(channel.array), -1.0)))
-        factor = float(channel.column.unit.factor * channel.column.scale[0])
+        factor = si_factor(channel)
         value = f"{channel.values[worst] / factor:.4g} {channel.column.unit.text}".strip()
         text = f"is {value} at {channel.seconds[worst]:.6g} s"
         if far.sum() > 1:

@@ -190,19 +190,3 @@ class ReferenceModel:
         return simulate_free_run(
             self.coarse_automaton, recording, self.mapping, self.run_programs, self._programs
         )
-
-
-_cache: list[ReferenceModel] = []
-
-
-def cached_reference(
-    automaton: Automaton, mapping: RecordingMap, run_programs: RunFunction
-) -> ReferenceModel:
-    """Return the reference model; the latest one is reused for identical arguments."""
-    if _cache:
-        latest = _cache[0]
-        same = latest.automaton is automaton and latest.mapping is mapping
-        if same and latest.run_programs is run_programs:
-            return latest
-    _cache[:] = [ReferenceModel(automaton, mapping, run_programs)]
-    return _cache[0]

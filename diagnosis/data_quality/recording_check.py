@@ -12,8 +12,7 @@ from diagnosis.data_quality.excitation import Excitation, analyse_excitation
 from diagnosis.data_quality.finding import Finding, sort_by_severity
 from diagnosis.data_quality.model_agreement import OutputAgreement, compare_with_simulation
 from diagnosis.data_quality.outlier import drop_huge_values, find_long_pauses, find_outliers
-from diagnosis.data_quality.output_comparison import RunFunction, cached_reference, run_interpreter
-from diagnosis.data_quality.redundant_speeds import find_redundant_speeds
+from diagnosis.data_quality.output_comparison import ReferenceModel, RunFunction, run_interpreter
 from diagnosis.data_quality.unit_correction import (
     find_corrections,
     find_millisecond_time,
@@ -21,6 +20,7 @@ from diagnosis.data_quality.unit_correction import (
 )
 from diagnosis.data_quality.unit_sign_clock_errors import (
     agrees_with_other_outputs,
+    find_redundant_speeds,
     find_unit_sign_clock_errors,
 )
 from engine.recordings.recording import Recording
@@ -86,7 +86,7 @@ def check_recordings(
     findings += [*_find_insufficient_data(recordings, channels, excited), *file_findings]
     reference = None
     if automaton is not None and automaton.period is None:
-        reference = cached_reference(automaton, mapping, run_programs)
+        reference = ReferenceModel(automaton, mapping, run_programs)
         for one in recordings:
             findings += [] if mismatches[one.name] else find_millisecond_time(one, reference)
     broken = {finding.recording for finding in findings if finding.kind in DISQUALIFYING_KINDS}

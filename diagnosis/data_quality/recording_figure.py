@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 
 from diagnosis.data.array_types import Reals
-from diagnosis.data_quality.channel import ChannelCheck
+from diagnosis.data_quality.channel import ChannelCheck, si_factor
 from diagnosis.data_quality.excitation import Excitation, SignalExcitation, spectrum
 from diagnosis.data_quality.finding import format_findings
 from diagnosis.data_quality.recording_check import RecordingCheck
-from engine.recordings.recording import Channel, Recording
+from engine.recordings.recording import Recording
 from engine.results.mode_band import PALETTE
 from engine.results.plot import Picture
 from language.text.sanitise import escape_invisible, truncate
@@ -28,7 +28,7 @@ MAX_WINDOW = 1024
 MAX_FINDINGS = 5
 MAX_LINE_LENGTH = 200
 BLUE, RED, GREEN, YELLOW, _, PURPLE, GREY = PALETTE
-PALE = "#d8d8d8"
+PALE, ORANGE = "#d8d8d8", "#cc7a00"
 SIGNS = {"error": "\N{BLACK CIRCLE}", "warning": "\N{BLACK UP-POINTING TRIANGLE}", "note": "-"}
 COLOURS = {"error": "#cc3344", "warning": "#b58900", "note": GREY}
 
@@ -69,13 +69,17 @@ def _draw_channels(
         for recording in recordings:
             channel = recording.channels.get(name)
             move = shift - float(recording.start)
+            shaded = [((float(a), float(b)), GREEN, 0.07) for a, b in recording.windows]
             if channel is not None:
-                _draw_signal(axis, channel, move)
+                times, values = _envelope(channel.seconds + move, channel.array)
+                colour = ORANGE if channel.column.to is not None else BLUE
+                axis.plot(times, values / si_factor(channel), color=colour, lw=0.8)
                 for one in check.channels:
                     if (one.recording, one.name) == (recording.name, name):
-                        _mark_defects(axis, one, move)
-            for first, last in recording.windows:
-                _shade(axis, (float(first), float(last)), move, GREEN, 0.07)
+                        stuck = [(one.stuck, YELLOW, 0.35)] if one.stuck else []
+                        shaded = [*((gap, RED, 0.25) for gap in one.gaps), *stuck, *shaded]
+            for (start, end), colour, alpha in shaded:
+                axis.axvspan(start + move, end + move, color=colour, alpha=alpha, lw=0)
             if row == 0 and len(recordings) > 1:
                 across, text = axis.get_xaxis_transform(), escape_invisible(f" {recording.name}")
                 axis.text(shift, 1.0, text, fontsize=7.5, color=GREY, va="top", transform=across,
@@ -103,29 +107,6 @@ def _format_facts(check: ChannelCheck) -> str:
     return escape_invisible("   ".join(parts))
 
 
-def _draw_signal(axis: Axes, channel: Channel, shift: float) -> None:
-    """Draw one channel in the unit of its file, shifted in time."""
-    times, values = _envelope(channel.seconds + shift, channel.array)
-    colour = "#cc7a00" if channel.column.to is not None else BLUE
-    axis.plot(times, values / _si_factor(channel), color=colour, lw=0.8)
-
-
-def _mark_defects(axis: Axes, check: ChannelCheck, shift: float) -> None:
-    """Shade the gaps and the stuck interval of a channel."""
-    for gap in check.gaps:
-        _shade(axis, gap, shift, RED, 0.25)
-    if check.stuck:
-        _shade(axis, check.stuck, shift, YELLOW, 0.35)
-
-
-def _shade(
-    axis: Axes, interval: tuple[float, float], shift: float, colour: str, alpha: float
-) -> None:
-    """Shade an interval [s], shifted in time."""
-    start, end = interval
-    axis.axvspan(start + shift, end + shift, color=colour, alpha=alpha, lw=0)
-
-
 def _envelope(times: Reals, values: Reals) -> tuple[Reals, Reals]:
     """Return the curve, or the minimum and maximum of each block if it has too many points."""
     if len(values) <= MAX_POINTS:
@@ -147,55 +128,47 @@ def _draw_operating_range(
     axis: Axes, recordings: Sequence[Recording], excitation: Excitation
 ) -> None:
     """Draw the main input over the main speed."""
-    axis.set_title("where the machine has been", loc="left", fontsize=9.5)
     first, second = _main_signal(excitation.inputs), _main_signal(excitation.speeds)
     pairs = [
         (r.channels[first.name], r.channels[second.name])
         for r in recordings
         if first and second and {first.name, second.name} <= r.channels.keys()
     ]
-    if not pairs or first is second:
-        _draw_empty(axis, "no input beside a speed")
+    title = "where the machine has been"
+    if not first or not second or not pairs or first is second:
+        _draw_empty(axis, title, "no input beside a speed")
         return
     for driven, speed in pairs:
-        x = np.interp(driven.seconds, speed.seconds, speed.array) / _si_factor(speed)
-        y = driven.array / _si_factor(driven)
+        x = np.interp(driven.seconds, speed.seconds, speed.array) / si_factor(speed)
+        y = driven.array / si_factor(driven)
         axis.plot(x, y, color=BLUE, lw=0.3, alpha=0.5)
         axis.scatter(x[::3], y[::3], s=5, color=BLUE, alpha=0.35, lw=0)
-        axis.set_xlabel(escape_invisible(_axis_label(speed)), fontsize=8, parse_math=False)
-        axis.set_ylabel(escape_invisible(_axis_label(driven)), fontsize=8, parse_math=False)
     axis.axhline(0.0, color="black", lw=0.6)
     axis.axvline(0.0, color="black", lw=0.6)
-    axis.tick_params(labelsize=7.5)
-    axis.spines[["top", "right"]].set_visible(False)
+    _label_axes(axis, title, f"{second.name} [{second.unit}]", f"{first.name} [{first.unit}]")
 
 
 def _draw_spectrum(axis: Axes, recordings: Sequence[Recording], check: RecordingCheck) -> None:
     """Draw the amplitude spectral density of the main input, and the level of its noise."""
-    axis.set_title("what the input excites", loc="left", fontsize=9.5)
-    main = _main_signal(check.excitation.inputs)
+    main, title = _main_signal(check.excitation.inputs), "what the input excites"
     facts = [one for one in check.channels if main and one.name == main.name]
     if not main or not facts:
-        _draw_empty(axis, "no input")
+        _draw_empty(axis, title, "no input")
         return
     for recording, one in zip(recordings, facts, strict=False):
         channel = recording.channels[main.name]
         if len(channel.array) < 64:
             continue
-        values = (channel.array - channel.array.mean()) / _si_factor(channel)
+        values = (channel.array - channel.array.mean()) / si_factor(channel)
         frequencies, power = spectrum(values, one.rate, MAX_WINDOW)
-        axis.loglog(frequencies[1:], np.sqrt(power[1:]) + 1e-12, color="#cc7a00", lw=0.9, alpha=0.8)
+        axis.loglog(frequencies[1:], np.sqrt(power[1:]) + 1e-12, color=ORANGE, lw=0.9, alpha=0.8)
     noise = max(facts[0].noise, facts[0].quantum / np.sqrt(12.0)) / facts[0].factor
     if noise:
         level = noise * np.sqrt(2.0 / facts[0].rate)
         axis.axhline(level, color=GREY, lw=1.0, ls="--")
         axis.annotate("its noise", (0.01, level), xycoords=("axes fraction", "data"), fontsize=7.5,
                       ha="left", va="bottom", color=GREY)  # fmt: skip
-    axis.set_xlabel("frequency [Hz]", fontsize=8)
-    axis.set_ylabel(escape_invisible(f"{main.name} [{main.unit}/\N{SQUARE ROOT}Hz]"), fontsize=8,
-                    parse_math=False)  # fmt: skip
-    axis.tick_params(labelsize=7.5, which="both")
-    axis.spines[["top", "right"]].set_visible(False)
+    _label_axes(axis, title, "frequency [Hz]", f"{main.name} [{main.unit}/\N{SQUARE ROOT}Hz]")
 
 
 def _draw_effects(axis: Axes, excitation: Excitation) -> None:
@@ -232,17 +205,17 @@ def _draw_findings(axis: Axes, check: RecordingCheck) -> None:
                   parse_math=False)  # fmt: skip
 
 
-def _draw_empty(axis: Axes, text: str) -> None:
-    """Write a text in the middle of empty axes."""
+def _label_axes(axis: Axes, title: str, x: str, y: str) -> None:
+    """Write the title and the labels of axes, and hide the upper and the right border."""
+    axis.set_title(title, loc="left", fontsize=9.5)
+    axis.set_xlabel(escape_invisible(x), fontsize=8, parse_math=False)
+    axis.set_ylabel(escape_invisible(y), fontsize=8, parse_math=False)
+    axis.tick_params(labelsize=7.5, which="both")
+    axis.spines[["top", "right"]].set_visible(False)
+
+
+def _draw_empty(axis: Axes, title: str, text: str) -> None:
+    """Write a title, and a text in the middle of empty axes."""
+    axis.set_title(title, loc="left", fontsize=9.5)
     axis.axis("off")
     axis.text(0.5, 0.5, text, ha="center", color=GREY, fontsize=9, transform=axis.transAxes)
-
-
-def _si_factor(channel: Channel) -> float:
-    """Return the factor from the unit of the file to SI."""
-    return float(channel.column.unit.factor * channel.column.scale[0])
-
-
-def _axis_label(channel: Channel) -> str:
-    """Return the name and unit of a channel."""
-    return f"{channel.column.name} [{channel.column.unit.text}]"

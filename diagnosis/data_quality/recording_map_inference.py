@@ -116,7 +116,7 @@ def _left_out_findings(file: RecordedFile, mapping: RecordingMap, name: str) -> 
     for column in dict.fromkeys(file.names):
         text = ""
         severity: Severity = "note"
-        if list(file.names).count(column) > 1:
+        if file.names.count(column) > 1:
             text, severity = "is in the file twice", "error"
         elif column == mapping.time or column in mapping.columns:
             written = mapping.columns[column].file_unit if column in mapping.columns else ""
@@ -144,22 +144,17 @@ def _left_out_findings(file: RecordedFile, mapping: RecordingMap, name: str) -> 
 def _explain_left_out(file: RecordedFile, column: str) -> tuple[str, Severity]:
     """Return why a column is none of numbers, or cannot be read, and how severe that is."""
     try:
-        return _explain_no_number(file.read(column))
+        samples = file.read(column)
     except SpecError as error:
         return f"cannot be read ({error.problems[0].label.replace('`', '')})", "warning"
-
-
-def _explain_no_number(samples: Samples) -> tuple[str, Severity]:
-    """Return why a column is none of numbers, and how severe that is."""
     values = samples.values
     bad = [k for k, value in enumerate(values) if value is not None and not math.isfinite(value)]
     count = sum(value is not None for value in values) - len(bad)
-    texts = [samples.text(k) for k in bad]
-    word = next((text for text in texts if not NO_VALUE.fullmatch(text)), "")
+    word = next((text for text in map(samples.text, bad) if not NO_VALUE.fullmatch(text)), "")
     if word:
         return f"has text, such as '{word[:MAX_SHOWN].replace('`', '')}'", "warning"
     if not count:
-        word = next((text for k in range(len(values)) if (text := samples.text(k))), "")
+        word = next(filter(None, map(samples.text, range(len(values)))), "")
         return f"has no number: it is {'all ' + word if word else 'blank'}", "error"
     return f"has numbers in {count} of its {len(values)} cells only", "warning"
 
@@ -168,13 +163,15 @@ def _clock_findings(
     file: RecordedFile, column: str, mapping: RecordingMap, name: str
 ) -> list[Finding]:
     """Return an error if a time column of channels shares hardly any time with that of the map."""
+    if file.names.count(mapping.time) != 1:
+        return []
     clocks = {}
-    for one in (mapping.time, column) if list(file.names).count(mapping.time) == 1 else ():
+    for one in (mapping.time, column):
         ending = one.rpartition("_")[2].lower()
         factor = float(parse_unit(ending).factor) if ending in ("ms", "us") else 1.0
         known = [v for v in file.read(one).values if v is not None and math.isfinite(v)]
         clocks[one] = factor * np.array(known)
-    if len(clocks) < 2 or not all(is_continuous(stamps) for stamps in clocks.values()):
+    if not all(is_continuous(stamps) for stamps in clocks.values()):
         return []
     first, second = clocks.values()
     amount = lacking_overlap(first, second, is_other_clock=True)
@@ -188,7 +185,7 @@ def _clock_findings(
 def _numeric_columns(file: RecordedFile, time: str) -> Iterator[str]:
     """Yield the unique columns of numbers of a file except those of time, in its order."""
     names = _distinct_names(file, time)
-    yield from (n for n in names if list(file.names).count(n) == 1 and _is_number(file, n))
+    yield from (n for n in names if file.names.count(n) == 1 and _is_number(file, n))
 
 
 def _distinct_names(file: RecordedFile, time: str) -> list[str]:
@@ -204,7 +201,7 @@ def _find_time_column(file: RecordedFile, problems: Problems) -> str:
     """Return the first column named like time, else the first increasing one, else none ("")."""
     named = [name for name in file.names if TIME_NAME.fullmatch(name)]
     for name in (*named, *file.names):
-        if list(file.names).count(name) != 1:
+        if file.names.count(name) != 1:
             continue
         values = [v for v in file.read(name).values if v is not None]
         if name in named or (len(values) > 1 and bool(np.all(np.diff(values) > 0.0))):

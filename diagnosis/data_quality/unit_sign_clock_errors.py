@@ -1,15 +1,27 @@
-"""Unit, sign and clock errors: conclusions from the agreement of recordings with a simulation."""
+"""Unit, sign and clock errors: conclusions from the agreement of recordings with a simulation.
+
+Without a model, recorded speeds of one motion are compared with each other.
+"""
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from statistics import median
 
+import numpy as np
+
+from diagnosis.data_quality.excitation import is_speed
 from diagnosis.data_quality.finding import Finding, Severity
-from diagnosis.data_quality.model_agreement import OutputAgreement
-from engine.recordings.recording import Recording
+from diagnosis.data_quality.model_agreement import (
+    GAIN_SMOOTHING_STD,
+    OutputAgreement,
+    compare_signals,
+)
+from diagnosis.data_quality.output_comparison import OutputComparison
+from engine.recordings.recording import Channel, Recording, split_by_windows
 from language.expressions.units import are_compatible, parse_unit
 from language.loading.recording_map_reader import column_dimension
 from language.model.automaton import Automaton
@@ -44,6 +56,10 @@ UNIT_FACTORS: Sequence[tuple[float, str, str]] = (
     (1.0e-3, "", "a unit a thousand times larger than the map says"),
 )
 """Factor of measured to simulated, the unit for which it can occur, and its cause."""
+MIN_SPEED_CORRELATION = 0.9
+"""Correlation of the rates of change from which two speeds are one motion."""
+MAX_SPEED_OFFSET = 3.0
+"""A larger offset, in reference times, is a period of the motion rather than of the clock."""
 
 
 def find_unit_sign_clock_errors(
@@ -60,13 +76,13 @@ def find_unit_sign_clock_errors(
     recording is a warning.
     """
     own = {
-        recording.name: _find_errors(
+        recording.name: _ClearAgreements(
             recording.name,
             [agreement for agreement in agreements if agreement.recording == recording.name],
             automaton,
             mapping,
             [recording],
-        )
+        ).find_errors()
         for recording in recordings
     }
     single = [finding for findings in own.values() for finding in findings]
@@ -75,7 +91,9 @@ def find_unit_sign_clock_errors(
         return single
     shared = [
         finding
-        for finding in _find_errors("", agreements, automaton, mapping, recordings)
+        for finding in _ClearAgreements(
+            "", agreements, automaton, mapping, recordings
+        ).find_errors()
         if _is_shared(finding, own, agreements)
     ]
     units = [f for f in single if f.kind == "unit"]
@@ -144,47 +162,38 @@ def _similar_kinds(kind: str) -> tuple[str, ...]:
     return ("unit", "scale") if kind in ("unit", "scale") else (kind,)
 
 
-def _find_errors(
-    name: str,
-    agreements: Sequence[OutputAgreement],
-    automaton: Automaton,
-    mapping: RecordingMap,
-    recordings: Sequence[Recording],
-) -> list[Finding]:
-    """Return sign and unit errors of clear agreements, or clock errors if there are none."""
-    by_channel: dict[str, list[OutputAgreement]] = {}
-    for agreement in agreements:
-        if agreement.is_clear:
-            by_channel.setdefault(agreement.channel, []).append(agreement)
-    if not by_channel:
-        return []
-    one = _AgreementsByChannel(name, recordings, automaton, mapping, by_channel)
-    return [*one.find_sign_errors(), *one.find_unit_errors()] or one.find_clock_errors()
-
-
-class _AgreementsByChannel:
-    """The clear agreements of one recording or of all of them, by channel."""
+class _ClearAgreements:
+    """The clear agreements of one recording, or of all of them for an empty name, by channel."""
 
     def __init__(
         self,
         name: str,
-        recordings: Sequence[Recording],
+        agreements: Sequence[OutputAgreement],
         automaton: Automaton,
         mapping: RecordingMap,
-        agreements: Mapping[str, Sequence[OutputAgreement]],
+        recordings: Sequence[Recording],
     ) -> None:
+        by_channel: dict[str, list[OutputAgreement]] = {}
+        for agreement in agreements:
+            if agreement.is_clear:
+                by_channel.setdefault(agreement.channel, []).append(agreement)
         self.name = name
         self.mapping = mapping
-        self.relations = agreements
-        self.gains = {name: median(r.gain for r in rs) for name, rs in agreements.items()}
-        self.lags = {name: median(r.significant_lag for r in rs) for name, rs in agreements.items()}
-        self.unit = median(r.time_unit for rs in agreements.values() for r in rs)
+        self.relations = by_channel
+        self.gains = {name: median(r.gain for r in rs) for name, rs in by_channel.items()}
+        self.lags = {name: median(r.significant_lag for r in rs) for name, rs in by_channel.items()}
+        units = [r.time_unit for rs in by_channel.values() for r in rs]
+        self.unit = median(units) if units else math.inf
         self.inputs = [
             channel.column.name
             for channel in recordings[0].channels.values()
             if channel.column.to in automaton.inputs
             if any(_varies(recording, channel.column.name) for recording in recordings)
         ]
+
+    def find_errors(self) -> list[Finding]:
+        """Return sign and unit errors, or clock errors if there are none."""
+        return [*self.find_sign_errors(), *self.find_unit_errors()] or self.find_clock_errors()
 
     def _attribute(self, channels: Sequence[str]) -> tuple[str, str]:
         """Return the channel to report and its name: an input if all outputs are affected."""
@@ -197,30 +206,24 @@ class _AgreementsByChannel:
     def find_sign_errors(self) -> list[Finding]:
         """Return errors for outputs with a negative gain; one for the input if all are negative."""
         odd = [name for name, gain in self.gains.items() if gain < 0.0]
-        if not odd:
-            return []
-        found = []
-        for group in [odd] if len(odd) == len(self.gains) else [[name] for name in odd]:
-            channel, called = self._attribute(group)
-            text = f"{called} has the wrong sign: it moves against what the model gives"
-            found.append(Finding("sign", self.name, channel, text, "error"))
-        return found
+        text = "has the wrong sign: it moves against what the model gives"
+        found = [self._attribute(group) for group in _groups(odd, len(odd) == len(self.gains))]
+        return [Finding("sign", self.name, one, f"{name} {text}", "error") for one, name in found]
 
     def find_unit_errors(self) -> list[Finding]:
         """Return findings on outputs much larger or smaller than the simulated ones."""
         sizes = {name: abs(gain) for name, gain in self.gains.items()}
         odd = [n for n, size in sizes.items() if not 1.0 / MAX_SCALE_RATIO < size < MAX_SCALE_RATIO]
-        if not odd:
-            return []
-        together = len(odd) == len(sizes) and max(sizes.values()) < 1.6 * min(sizes.values())
+        is_all = len(odd) == len(sizes)
+        together = bool(odd) and is_all and max(sizes.values()) < 1.6 * min(sizes.values())
         found = []
-        for group in [odd] if together else [[name] for name in odd]:
-            channel, called = self._attribute(group) if together else (group[0], f"`{group[0]}`")
-            if together and channel not in sizes:
+        for group in _groups(odd, together):
+            channel, called = self._attribute(group)
+            if channel in sizes:
+                size = median(sizes[name] for name in group)
+                found.append(self._scale_finding(channel, called, size, True))
+            else:
                 found.append(self._shared_scale_finding(group, channel, called))
-                continue
-            size = median(sizes[name] for name in group)
-            found.append(self._scale_finding(channel, called, size, True))
         return found
 
     def _shared_scale_finding(self, outputs: Sequence[str], channel: str, subject: str) -> Finding:
@@ -259,25 +262,19 @@ class _AgreementsByChannel:
 
     def find_clock_errors(self) -> list[Finding]:
         """Return findings on outputs with a larger lag than actuators and sensors have."""
-        odd = [name for name, lag in self.lags.items() if abs(lag) >= OFFSET_WARNING * self.unit]
-        if not odd:
-            return []
-        lags = [self.lags[name] for name in odd]
-        together = (
-            len(odd) == len(self.lags) and max(lags) - min(lags) < CLOCK_TOLERANCE * self.unit
-        )
-        groups = [odd] if together else [[name] for name in odd]
-        return [self._clock_offset_finding(group, together) for group in groups]
+        odd = {n: lag for n, lag in self.lags.items() if abs(lag) >= OFFSET_WARNING * self.unit}
+        spread = max(odd.values()) - min(odd.values()) if odd else math.inf
+        is_one = spread < CLOCK_TOLERANCE * self.unit
+        groups = _groups(list(odd), is_one and len(odd) == len(self.lags))
+        return [self._clock_offset_finding(group) for group in groups]
 
-    def _clock_offset_finding(self, channels: Sequence[str], is_shared: bool) -> Finding:
+    def _clock_offset_finding(self, channels: Sequence[str]) -> Finding:
         """Return the clock finding on channels: an error if most agreements have the same lag."""
         lag = median(self.lags[name] for name in channels)
-        channel, called = channels[0], f"`{channels[0]}`"
-        if is_shared:
-            channel, called = self._attribute(channels)
+        channel, called = self._attribute(channels)
         later = (lag > 0.0) == (channel in self.lags)
         text = f"the clock of {called} is {abs(lag):.2f} s {'late' if later else 'early'}"
-        if is_shared and len(channels) == 1 and self.inputs:
+        if len(channels) == len(self.lags) == 1 and self.inputs:
             both = f"`{channels[0]}` and input `{self.inputs[0]}`"
             text = f"the clocks of {both} are {abs(lag):.2f} s apart"
         each = [r.significant_lag for name in channels for r in self.relations[name]]
@@ -287,7 +284,70 @@ class _AgreementsByChannel:
         return Finding("clock_offset", self.name, channel, text, severity)
 
 
+def _groups(names: Sequence[str], is_one: bool) -> list[Sequence[str]]:
+    """Return names as one group or as groups of one name each; none without names."""
+    return [names] if names and is_one else [[name] for name in names]
+
+
 def _varies(recording: Recording, name: str) -> bool:
     """Return whether a channel is recorded and not constant."""
     channel = recording.channels.get(name)
     return channel is not None and len(set(channel.values)) > 1
+
+
+def find_redundant_speeds(recordings: Sequence[Recording]) -> list[Finding]:
+    """Return findings on pairs of speeds that agree except for a sign or a clock offset.
+
+    Speeds agree from `MIN_SPEED_CORRELATION` on, in the longest window of a recording. A finding
+    needs `SHARED_FRACTION` of these recordings; it is a warning if there is one only.
+    """
+    found: dict[tuple[str, str], list[OutputAgreement]] = {}
+    for recording in recordings:
+        speeds = [channel for channel in recording.channels.values() if is_speed(channel)]
+        for first, second in itertools.combinations(speeds, 2):
+            agreement = _compare_speeds(recording, first, second)
+            if agreement is not None and abs(agreement.correlation) >= MIN_SPEED_CORRELATION:
+                key = first.column.name, second.column.name
+                found.setdefault(key, []).append(agreement)
+    return [
+        finding for pair, each in found.items() for finding in _redundancy_findings(*pair, each)
+    ]
+
+
+def _compare_speeds(
+    recording: Recording, first: Channel, second: Channel
+) -> OutputAgreement | None:
+    """Return the agreement of two speeds in the longest window; None if they hardly overlap."""
+    piece = max(split_by_windows(recording), key=lambda piece: piece.end - piece.start)
+    one = piece.channels.get(first.column.name)
+    other = piece.channels.get(second.column.name)
+    if one is None or other is None:
+        return None
+    inside = (other.seconds >= one.seconds[0]) & (other.seconds <= one.seconds[-1])
+    if inside.sum() < 2:
+        return None
+    times = other.seconds[inside]
+    same = np.interp(times, one.seconds, one.array)
+    compared = OutputComparison(times, other.array[inside], same)
+    return compare_signals(recording.name, other.column.name, compared, GAIN_SMOOTHING_STD)
+
+
+def _redundancy_findings(
+    first: str, second: str, agreements: Sequence[OutputAgreement]
+) -> list[Finding]:
+    """Return the finding on a pair of speeds, if most recordings agree on a sign or an offset."""
+    both = f"`{first}` and `{second}` are one motion"
+    severity: Severity = "error" if len(agreements) > 1 else "warning"
+    where = agreements[0].recording if len(agreements) == 1 else ""
+    if sum(agreement.gain < 0.0 for agreement in agreements) > SHARED_FRACTION * len(agreements):
+        return [Finding("sign", where, second, f"{both} with opposite signs", severity)]
+    lag = median(agreement.significant_lag for agreement in agreements)
+    unit = median(agreement.time_unit for agreement in agreements)
+    near = CLOCK_TOLERANCE * unit
+    same = sum(abs(agreement.significant_lag - lag) <= near for agreement in agreements)
+    is_offset = OFFSET_WARNING * unit <= abs(lag) <= MAX_SPEED_OFFSET * unit
+    if is_offset and same > SHARED_FRACTION * len(agreements):
+        late = second if lag > 0.0 else first
+        text = f"{both}, but the clock of `{late}` is {abs(lag):.2f} s late"
+        return [Finding("clock_offset", where, late, text, severity)]
+    return []

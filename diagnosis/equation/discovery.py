@@ -110,8 +110,8 @@ def _propose_formulas(
         options += [(gain, location, excess, (one,)) for gain, one in ranked[:MAX_FITS]]
         chosen = select_terms(excess.problem, excess.columns, MAX_TERMS, MIN_SECOND_TERM_GAIN)
         if len(chosen) > 1:
-            pair = tuple(one.columns for one in chosen)
-            options.append((sum(one.gain for one in chosen), location, excess, pair))
+            gains, pair = zip(*chosen, strict=True)
+            options.append((sum(gains), location, excess, pair))
     options.sort(key=lambda option: -option[0])
     first = [max((o for o in options if o[1] is place), key=lambda o: o[0]) for place in places]
     best_options = [*first, *(option for option in options if option not in first)][:MAX_FITS]

@@ -53,15 +53,6 @@ class DisturbanceResponse:
         )
         return runs.split()
 
-    def predict_innovations(self, disturbance: Sequence[Reals]) -> list[Reals]:
-        """Return the innovations of `predict` after burn-in, (samples, outputs) each."""
-        pages, recorded = self._with_disturbance(disturbance)
-        predictor, substeps = self.candidate.predictor, self.candidate.compiled.substeps
-        runs = predictor.predict_points(
-            pages[np.newaxis], recorded, self.transient_gains, self.steady_state_gains, substeps
-        )
-        return self.after_burn_in(np.split(runs[0][0], recorded.starts[1:-1]))
-
     def _with_disturbance(self, disturbance: Sequence[Reals]) -> tuple[Reals, StackedRecordings]:
         """Return the pages, and recordings in which the disturbance is measured."""
         together, candidate = stack_recordings(self.series), self.candidate
@@ -75,11 +66,11 @@ class DisturbanceResponse:
         values = [self.model.values(k) for k in range(len(self.series))]
         return candidate.calibration_pages(values, first), with_outputs
 
-    def after_burn_in(self, innovations: Sequence[Reals]) -> list[Reals]:
+    def innovations_of(self, runs: Sequence[Prediction]) -> list[Reals]:
         """Return the innovations of compared outputs after burn-in, (samples, outputs) each."""
         seen = len(self.model.candidate.predictor.outputs)
-        pairs = zip(innovations, self.series, strict=True)
-        return [values[burn_in_samples(one) :, :seen] for values, one in pairs]
+        pairs = zip(runs, self.series, strict=True)
+        return [run.innovations[burn_in_samples(one) :, :seen] for run, one in pairs]
 
 
 def build_disturbance_response(

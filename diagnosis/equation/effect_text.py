@@ -43,10 +43,25 @@ class FormulaEffect:
 
         `values` are quantities by qualified name, `fitted` the values [SI] of each recording.
         """
-        return " + ".join(
-            _format_term(term, k, values, fitted, self.placed_effect)
-            for k, term in enumerate(self.terms, 1)
-        )
+        name = self.placed_effect.qualified_name
+        summands = []
+        for k, term in enumerate(self.terms, 1):
+            amount = values[name(f"a_{k}")]
+            unit = "" if amount.unit == "1" else f" {amount.unit}"
+            text = f"{amount.value:.4g}{unit}"
+            if term.per_recording:
+                own = ", ".join(f"{one[name(f'a_{k}')]:.3g}" for one in fitted)
+                text = f"{{{own}}}{unit}"
+            text += "" if term.text == "1" else f" * {term.text}"
+            if term.order:
+                rate = next(iter(term.states.values()))[1].split("= ")[1]
+                phases = [one[name(f"ph_{k}")] for one in fitted]
+                phase = f"{phases[0]:.2f}" if len(phases) == 1 else "phase"
+                text += f" * sin({term.order} * angle of {rate} + {phase})"
+            elif term.states:
+                text += f" ({term.name})"
+            summands.append(text)
+        return " + ".join(summands)
 
 
 def build_formula(
@@ -67,7 +82,9 @@ def build_formula(
         for k, pair in enumerate(zip(terms, weights, strict=True), 1)
     ]
     name = f"unknown_{number}_at_{place}"
-    text = _declare_reads(_effect_text(model_set, name, section, terms, parts))
+    draft = _effect_text(model_set, name, section, terms, parts, ())
+    foreign = external_names(_parse_text(name, draft).root)
+    text = _effect_text(model_set, name, section, terms, parts, foreign)
     problems = Problems()
     effect = read_effect(_parse_text(name, text), problems)
     problems.raise_if_errors()
@@ -81,15 +98,6 @@ def build_formula(
 def _parse_text(name: str, text: str) -> Document:
     """Return the document of an effect given as text."""
     return parse_document(Source(f"{name}.yaml", tuple(text.splitlines())), text)
-
-
-def _declare_reads(text: str) -> str:
-    """Return the text of an effect with a `reads` line for the names of the model that it uses."""
-    foreign = external_names(_parse_text("formula", text).root)
-    head, sign, rest = text.partition("\nat: ")
-    place, _, more = rest.partition("\n")
-    reads = f"\nreads: [{', '.join(foreign)}]" if foreign else ""
-    return f"{head}{sign}{place}{reads}\n{more}"
 
 
 @dataclass(frozen=True)
@@ -162,8 +170,12 @@ def _effect_text(
     section: str,
     terms: Sequence[LibraryTerm],
     parts: Sequence[_TermText],
+    reads: Sequence[str],
 ) -> str:
-    """Return the YAML text of an effect that adds the sum of the terms at a place of a section."""
+    """Return the YAML text of an effect that adds the sum of the terms at a place of a section.
+
+    `reads` are the names of the model that the terms use.
+    """
     fits = {
         "flow": "balance: {of: rate}",
         "elements": "element: {kind: elastic}",
@@ -176,6 +188,7 @@ def _effect_text(
         f"effect: {name}",
         f"about: what recordings of {model_set.automaton.name} ask for beside its model, {names}",
         f"at: {{{fits[section]}}}",
+        *([f"reads: [{', '.join(reads)}]"] if reads else []),
     ]
     equations = [line for part in parts for line in part.equations]
     if section == "elements":
@@ -199,26 +212,3 @@ def _quote_value(line: str) -> str:
     """Return a line `key: value` with the value quoted if it contains a comma."""
     key, _, value = line.partition(": ")
     return f'{key}: "{value}"' if "," in value else line
-
-
-def _format_term(
-    term: LibraryTerm,
-    k: int,
-    values: Mapping[str, Quantity],
-    fitted: Sequence[Mapping[str, float]],
-    placed_effect: PlacedEffect,
-) -> str:
-    """Return term number `k` with its fitted coefficient and phase."""
-    amount = values[placed_effect.qualified_name(f"a_{k}")]
-    unit = "" if amount.unit == "1" else f" {amount.unit}"
-    number = f"{amount.value:.4g}{unit}"
-    if term.per_recording:
-        own = [one[placed_effect.qualified_name(f"a_{k}")] for one in fitted]
-        number = f"{{{', '.join(f'{one:.3g}' for one in own)}}}{unit}"
-    factor = "" if term.text == "1" else f" * {term.text}"
-    if not term.order:
-        return number + factor + (f" ({term.name})" if term.states else "")
-    rate = next(iter(term.states.values()))[1].split("= ")[1]
-    phases = [one[placed_effect.qualified_name(f"ph_{k}")] for one in fitted]
-    phase = f"{phases[0]:.2f}" if len(phases) == 1 else "phase"
-    return f"{number}{factor} * sin({term.order} * angle of {rate} + {phase})"

@@ -38,15 +38,6 @@ class RegressionProblem:
     integrated_autocorrelation: float
 
 
-@dataclass(frozen=True)
-class SelectedTerm:
-    """A term with its penalised and its cross-validated gain over earlier terms [nats]."""
-
-    columns: TermColumns
-    gain: float
-    cross_validated: float
-
-
 def build_problem(
     innovations: Sequence[Reals],
     parameters: Sequence[Reals],
@@ -69,58 +60,56 @@ def build_problem(
 
 
 def rank_terms(
-    problem: RegressionProblem, columns: Sequence[TermColumns]
+    problem: RegressionProblem,
+    columns: Sequence[TermColumns],
+    selected: Sequence[TermColumns] = (),
 ) -> list[tuple[float, TermColumns]]:
-    """Return the penalised gain [nats] of each term alone with the term, in descending order."""
-    before = _cost(problem, [])
+    """Return the penalised gain [nats] of each further term with the term, in descending order."""
+    before = _cost(problem, selected)
     ranked = [
-        (before - _cost(problem, [one]) - _complexity_penalty(problem, one), one) for one in columns
+        (before - _cost(problem, [*selected, one]) - _complexity_penalty(problem, one), one)
+        for one in columns
+        if one not in selected
     ]
     return sorted(ranked, key=lambda pair: -pair[0])
 
 
 def select_terms(
     problem: RegressionProblem, columns: Sequence[TermColumns], max_terms: int, min_gain: float
-) -> list[SelectedTerm]:
-    """Return the terms of a forward selection, at most `max_terms`, in the order of selection.
+) -> list[tuple[float, TermColumns]]:
+    """Return the penalised gains [nats] and the terms of a forward selection, at most `max_terms`.
 
     It ends when the penalised gain, or the cross-validated one of a further term, is below
     `min_gain` [nats].
     """
-    chosen: list[SelectedTerm] = []
-    selected: list[TermColumns] = []
+    chosen: list[tuple[float, TermColumns]] = []
     while len(chosen) < max_terms:
-        before = _cost(problem, selected)
-        rest = [one for one in columns if one not in selected]
-        gains = [
-            before - _cost(problem, [*selected, one]) - _complexity_penalty(problem, one)
-            for one in rest
-        ]
-        if not gains or max(gains) < min_gain:
+        selected = [one for _, one in chosen]
+        ranked = rank_terms(problem, columns, selected)
+        if not ranked or ranked[0][0] < min_gain:
             break
-        larger = [*selected, rest[int(np.argmax(gains))]]
-        left_out = _cross_validated_cost(problem, selected) - _cross_validated_cost(problem, larger)
-        if selected and left_out < min_gain:
-            break
-        selected = larger
-        chosen.append(SelectedTerm(selected[-1], max(gains), left_out))
+        if selected:
+            before = _cross_validated_cost(problem, selected)
+            if before - _cross_validated_cost(problem, [*selected, ranked[0][1]]) < min_gain:
+                break
+        chosen.append(ranked[0])
     return chosen
 
 
 def coefficients_of(problem: RegressionProblem, selected: Sequence[TermColumns]) -> list[Reals]:
     """Return the least-squares coefficients of each selected term, (recordings, waves) each."""
-    fit = _solve_least_squares(problem, selected, np.sum(problem.products, axis=1))
-    shared, own = problem.parameters, 0
+    shared, own, _ = _solve_least_squares(problem, selected, np.sum(problem.products, axis=1))
+    first_shared, first_own = problem.parameters, 0
     coefficients = []
     for one in selected:
         width = len(one.places)
         if one.has_recording_coefficients:
-            coefficients.append(fit.per_recording[:, own : own + width])
-            own += width
+            coefficients.append(own[:, first_own : first_own + width])
+            first_own += width
         else:
-            part = fit.shared[shared : shared + width]
+            part = shared[first_shared : first_shared + width]
             coefficients.append(np.tile(part, (len(problem.products), 1)))
-            shared += width
+            first_shared += width
     return coefficients
 
 
@@ -133,8 +122,8 @@ def _complexity_penalty(problem: RegressionProblem, term: TermColumns) -> float:
 
 def _cost(problem: RegressionProblem, selected: Sequence[TermColumns]) -> float:
     """Return half the residual squares [nats], over the integrated autocorrelation."""
-    fit = _solve_least_squares(problem, selected, np.sum(problem.products, axis=1))
-    return 0.5 * fit.residual_squares / problem.integrated_autocorrelation
+    *_, squares = _solve_least_squares(problem, selected, np.sum(problem.products, axis=1))
+    return 0.5 * squares / problem.integrated_autocorrelation
 
 
 def _cross_validated_cost(problem: RegressionProblem, selected: Sequence[TermColumns]) -> float:
@@ -144,27 +133,22 @@ def _cross_validated_cost(problem: RegressionProblem, selected: Sequence[TermCol
     for fold in range(FOLDS):
         tested = (fold + recordings) % FOLDS
         part = problem.products[recordings, tested]
-        fit = _solve_least_squares(problem, selected, np.sum(problem.products, axis=1) - part)
+        others = np.sum(problem.products, axis=1) - part
+        shared, own, _ = _solve_least_squares(problem, selected, others)
         for r in recordings:
             inner, right = _selected_products(problem, selected, part[r])
-            x = np.concatenate([fit.shared, fit.per_recording[r]])
+            x = np.concatenate([shared, own[r]])
             total += float(part[r][-1, -1] - 2.0 * right @ x + x @ inner @ x)
     return 0.5 * total / problem.integrated_autocorrelation
 
 
-@dataclass(frozen=True)
-class _LeastSquaresFit:
-    """Coefficients, those per recording (recordings, n), and residual squares with priors."""
-
-    shared: Reals
-    per_recording: Reals
-    residual_squares: float
-
-
 def _solve_least_squares(
     problem: RegressionProblem, selected: Sequence[TermColumns], products: Reals
-) -> _LeastSquaresFit:
-    """Return the least-squares fit; recording coefficients go by Schur complements."""
+) -> tuple[Reals, Reals, float]:
+    """Return shared coefficients, those per recording (recordings, n), and squares with priors.
+
+    The coefficients per recording are eliminated by Schur complements.
+    """
     shared = problem.parameters + sum(
         len(one.places) for one in selected if not one.has_recording_coefficients
     )
@@ -182,7 +166,7 @@ def _solve_least_squares(
         inside.append(solved)
     common = np.asarray(np.linalg.solve(a, g), dtype=np.float64)
     own = np.array([one[:, -1] - one[:, :-1] @ common for one in inside])
-    return _LeastSquaresFit(common, own, whole - float(g @ common))
+    return common, own, whole - float(g @ common)
 
 
 def _selected_products(

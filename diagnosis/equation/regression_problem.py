@@ -44,7 +44,7 @@ def regression_at(
     probe = build_disturbance_response(model_set, section, place, model)
     zero_disturbance = [np.zeros(one.count) for one in model_set.series]
     runs = probe.predict(zero_disturbance)
-    before = probe.after_burn_in([one.innovations for one in runs])
+    before = probe.innovations_of(runs)
     weigh = _HuberWeights(model, before)
     output = place_bindings(model_set, section, place).get("y", "") if section == "outputs" else ""
     signals = _formula_signals(model_set, probe, runs, {output: place} if output else {})
@@ -90,7 +90,8 @@ def _weighted_response(
 ) -> tuple[Reals, ...]:
     """Return the weighted decrease of innovations per unit of a disturbance, by recording."""
     size = float(np.sqrt(np.mean(np.concatenate(values) ** 2))) or 1.0
-    after = response.predict_innovations([one * (TEST_DISTURBANCE / size) for one in values])
+    runs = response.predict([one * (TEST_DISTURBANCE / size) for one in values])
+    after = response.innovations_of(runs)
     moved = [(a - b) * (size / TEST_DISTURBANCE) for a, b in zip(before, after, strict=True)]
     return weights.weight_and_flatten(moved)
 

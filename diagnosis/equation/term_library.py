@@ -107,13 +107,12 @@ def _speed_terms(signals: Signals) -> Iterator[LibraryTerm]:
 def _power_terms(signals: Signals, name: str, powers: Sequence[int]) -> Iterator[LibraryTerm]:
     """Yield the value, the signed square and the cube of a signal, those in `powers`."""
     values = signals.values[name]
-    if 1 in powers:
-        yield _linear_term(name, name, values)
-    if 2 in powers:
-        squares = [x * np.abs(x) for x in values]
-        yield _linear_term(f"the square of {name}", f"{name} * abs({name})", squares)
-    if 3 in powers:
-        yield _linear_term(f"the cube of {name}", f"{name}^3", [x**3 for x in values])
+    forms = {
+        1: (name, name, values),
+        2: (f"the square of {name}", f"{name} * abs({name})", [x * np.abs(x) for x in values]),
+        3: (f"the cube of {name}", f"{name}^3", [x**3 for x in values]),
+    }
+    yield from (_linear_term(*forms[power]) for power in powers)
 
 
 def _torque_terms(signals: Signals, name: str) -> Iterator[LibraryTerm]:

@@ -21,7 +21,7 @@ from diagnosis.estimation.innovations import KalmanGains, predict
 from diagnosis.estimation.jacobian import STEP
 from diagnosis.estimation.model_set import ModelSet
 from diagnosis.experiment.manoeuvre import Manoeuvre, manoeuvres_for
-from diagnosis.model.parameter_vector import ParameterVector, vector_of
+from diagnosis.model.parameter_vector import ParameterVector, values_at, vector_of
 
 MAX_CANDIDATES = 3
 """Number of candidates that are compared pair by pair."""
@@ -79,9 +79,9 @@ def plan_experiment(
     options = []
     for manoeuvre in manoeuvres_for(model_set):
         simulated = [_simulate_outputs(model, manoeuvre.series) for _, model in some]
-        if any(one is None for one in simulated):
+        runs = [run for run in simulated if run is not None]
+        if len(runs) < len(some):
             continue
-        runs = [one for one in simulated if one is not None]
         nats = [
             _expected_log_bayes_factor(model, model_set.series, manoeuvre.series, run)
             for k, (_, model) in enumerate(some)
@@ -137,10 +137,7 @@ def _normalised_innovations(
     model: Estimate, record: SampledRecording, point: ParameterVector
 ) -> Reals | None:
     """Return innovations over standard deviations (samples * outputs,); None if diverged."""
-    values = {
-        one.name: one.value(float(point.shared[k]))
-        for k, one in enumerate(model.candidate.free_parameters)
-    }
+    values = values_at(model.candidate, point, 0)
     run = predict(model.candidate, [record], [values], model.gains, model.noise_levels.huber_limits)
     if not run.is_complete:
         return None

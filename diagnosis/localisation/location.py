@@ -78,7 +78,7 @@ def location_of(
     location = Location(
         section, placed_effect.place, 0.0, 0.0, free_model=free_model, disturbance_state=state
     )
-    return _with_values(model_set, location, free_model, drifts)
+    return _with_values(model_set, location, drifts)
 
 
 def with_smoothed_disturbances(model_set: ModelSet, location: Location) -> Location:
@@ -105,8 +105,6 @@ def with_disturbances(
     Significant samples nearer than `WINDOW_DISTANCE` are one window; those shorter than half of it
     are dropped.
     """
-    free_model = location.free_model
-    assert free_model is not None
     values = [one.values for one in disturbances]
     pairs = zip(model_set.series, disturbances, strict=True)
     windows = [window for one, known in pairs for window in _significant_windows(known, one)]
@@ -114,13 +112,13 @@ def with_disturbances(
     location = dataclasses.replace(
         location, windows=tuple(windows[:MAX_WINDOWS]), disturbances=disturbances
     )
-    return _with_values(model_set, location, free_model, values)
+    return _with_values(model_set, location, values)
 
 
-def _with_values(
-    model_set: ModelSet, location: Location, free_model: Estimate, values: Sequence[Reals]
-) -> Location:
+def _with_values(model_set: ModelSet, location: Location, values: Sequence[Reals]) -> Location:
     """Return a location with size, modes and correlates of a disturbance [SI], (samples,) each."""
+    free_model = location.free_model
+    assert free_model is not None
     size = rms(np.concatenate(values))
     scale = acting_rms(model_set, location.section, location.place, free_model)
     return dataclasses.replace(

@@ -38,25 +38,15 @@ def format_location(locations: Sequence[Location], model_set: ModelSet) -> str:
         percent = 100.0 * best.fraction
         size += f" ({percent:.2g} %" if percent < 100.0 else f" ({percent:.0f} %"
         size += f" {SCALE_PHRASES[section]})"
-    parts = [size, *_format_windows(best), *_format_correlates(best)]
-    return f"missing {PLACE_PHRASES[best.section]} {best.place}: {', '.join(parts)}"
-
-
-def _format_windows(location: Location) -> list[str]:
-    """Return the share of the main of several modes, and the longest windows, as phrases."""
-    found = []
-    mode = max(location.modes, key=lambda name: location.modes[name], default="")
-    if len(location.modes) > 1:
-        found.append(f"{100.0 * location.modes[mode]:.0f} % of it in mode {mode}")
-    windows = [f"{a:.2f} to {b:.2f} s of {name}" for a, b, name in location.windows[:MAX_WINDOWS]]
+    parts = [size]
+    if len(best.modes) > 1:
+        mode = max(best.modes, key=lambda name: best.modes[name])
+        parts.append(f"{100.0 * best.modes[mode]:.0f} % of it in mode {mode}")
+    windows = [f"{a:.2f} to {b:.2f} s of {name}" for a, b, name in best.windows[:MAX_WINDOWS]]
     if windows:
-        found.append(f"most at {' and '.join(windows)}")
-    return found
-
-
-def _format_correlates(location: Location) -> list[str]:
-    """Return the strongest correlate as a phrase."""
-    if not location.correlates or abs(location.correlates[0][1]) < MIN_CORRELATION:
-        return ["along with no single quantity"]
-    name, correlation = location.correlates[0]
-    return [f"along with {name} (r = {correlation:.2f})"]
+        parts.append(f"most at {' and '.join(windows)}")
+    name, correlation = best.correlates[0] if best.correlates else ("", 0.0)
+    is_known = abs(correlation) >= MIN_CORRELATION
+    along = f"{name} (r = {correlation:.2f})" if is_known else "no single quantity"
+    parts.append(f"along with {along}")
+    return f"missing {PLACE_PHRASES[best.section]} {best.place}: {', '.join(parts)}"

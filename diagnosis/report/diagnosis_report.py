@@ -6,7 +6,6 @@ import dataclasses
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 from diagnosis.data_quality.finding import Finding, format_findings
 from diagnosis.data_quality.recording_check import RecordingCheck
@@ -43,22 +42,6 @@ class DiagnosisReport:
     def findings(self) -> tuple[Finding, ...]:
         """The findings on the recordings, errors first."""
         return self.check.findings
-
-
-def verdict_to_json(verdict: Verdict) -> dict[str, Any]:
-    """Return the JSON object of `verdict.json`, with None for numbers that are not finite."""
-    found = replace_non_finite(verdict.to_json())
-    assert isinstance(found, dict)
-    return found
-
-
-def replace_non_finite(value: Any) -> Any:
-    """Return dicts and lists with None in place of floats that are not finite."""
-    if isinstance(value, dict):
-        return {key: replace_non_finite(one) for key, one in value.items()}
-    if isinstance(value, list):
-        return [replace_non_finite(one) for one in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def unusable_reasons(check: RecordingCheck) -> tuple[str, ...]:

@@ -17,15 +17,10 @@ from diagnosis.model.compile_cache import node_text
 from diagnosis.model.effect_library import equation_changes
 from diagnosis.model.placed_effect import shipped_effects
 from diagnosis.report import report_text as sentences, tables
-from diagnosis.report.diagnosis_report import DiagnosisReport, verdict_to_json
+from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.figures import embed_svg, report_figures
 from diagnosis.report.model_comparison import ModelComparison, compare_models
-from diagnosis.report.number_text import format_probability
-from diagnosis.report.parameter_table import (
-    format_biased_parameters,
-    format_fixed_parameters,
-    parameter_rows,
-)
+from diagnosis.report.number_text import format_percent, format_probability, format_significant
 from diagnosis.report.reproduction import (
     SCENARIO,
     WINDOW,
@@ -35,8 +30,6 @@ from diagnosis.report.reproduction import (
     reproduction_commands,
 )
 from diagnosis.report.summary_cards import summary_cards
-from diagnosis.report.tables import describe_residuals, whiteness_rows
-from language.overlays.name_types import format_si_unit
 from language.text.diagnostic import MissingToolError
 
 REPORT = __name__.rpartition(".")[0]
@@ -93,32 +86,36 @@ def report_files(report: DiagnosisReport, variant: str, folder: Path = Path()) -
         files[f"{one.name}.svg"] = one.picture.data("svg")
         files[f"{one.name}.png"] = one.picture.data("png")
     if comparisons:
-        inputs = {n: format_si_unit(i.unit.dimension) for n, i in report.automaton.inputs.items()}
-        files[WINDOW] = format_window_csv(comparisons[0].window, inputs).encode()
-        files[SCENARIO] = format_scenario(report, comparisons[0].window).encode()
-    svg = {one.name: embed_svg(one, files[f"{one.name}.svg"]) for one in figures}
+        files[WINDOW] = format_window_csv(report.automaton, comparisons[0]).encode()
+        files[SCENARIO] = format_scenario(report, comparisons[0]).encode()
     context = {
-        **_verdict_context(report, comparisons),
+        **_verdict_context(report),
         **_model_context(report, comparisons),
-        **_data_context(report),
+        "unread": report.diagnosis.unread if report.diagnosis else (),
+        "findings": [
+            (severity, tables.split_code_spans(text))
+            for severity, text in format_findings(report.findings)
+        ],
+        "recordings": tables.recording_rows(report),
+        "untestable": report.check.excitation.untestable,
+        "fixed": tables.format_fixed_parameters(report),
+        "thresholds": report.case.thresholds,
         "commands": reproduction_commands(report, folder),
         "made_by": report_command(report, folder),
         "tools": tool_versions(),
         "sources": provenance_rows(report),
         "variant": variant,
         "drawings": {one.name: one for one in figures},
-        "svg": svg,
+        "svg": {one.name: embed_svg(one, files[f"{one.name}.svg"]) for one in figures},
     }
     files["report.html"] = render_html((REPORT,), "report.html.jinja", context).encode()
-    verdict = json.dumps(verdict_to_json(report.verdict), indent=2, allow_nan=False) + "\n"
+    verdict = json.dumps(report.verdict.to_json(), indent=2, allow_nan=False) + "\n"
     files["verdict.json"] = verdict.encode()
     return files
 
 
-def _verdict_context(
-    report: DiagnosisReport, comparisons: Sequence[ModelComparison]
-) -> dict[str, Any]:
-    """Return the values of the template for the verdict, the cards and the changed equations."""
+def _verdict_context(report: DiagnosisReport) -> dict[str, Any]:
+    """Return the values of the template for the verdict and the changed equations."""
     verdict, found = report.verdict, report.diagnosis
     placed_effects = [one.placed_effect for one in found.selection.accepted] if found else []
     effects = [one.effect for one in placed_effects]
@@ -129,56 +126,33 @@ def _verdict_context(
         "has_model": bool(placed_effects),
         "laid": [placed_effect.id for placed_effect in placed_effects],
         "headline": tables.split_code_spans(sentences.format_headline(report)),
-        "cards": summary_cards(report, comparisons[0].after if comparisons else ()),
-        "location": sentences.format_missing_location(report) if found else "",
+        "location": sentences.format_missing_location(report),
         "messages": verdict.messages,
         "abouts": [(one.name.replace("_", " "), one.about, one.signature) for one in effects],
         "changes": equation_changes(report.case.document, placed_effects),
         "places": tables.location_rows(verdict.location[0]) if verdict.location else [],
         "rivals": [sentences.format_effect(one) for one in verdict.ambiguous_with],
         "separation": sentences.format_separation(report),
-        "signals": list(zip(comparisons[0].runs.signals, comparisons[0].units, strict=True))
-        if comparisons
-        else [],
     }
 
 
 def _model_context(
     report: DiagnosisReport, comparisons: Sequence[ModelComparison]
 ) -> dict[str, Any]:
-    """Return the values of the template for misfits, candidates, parameters and residuals."""
-    found = report.diagnosis
-    if found is None:
-        return {"fit": [], "candidates": [], "unfitted": [], "parameters": [], "whiteness": []}
-    selection = found.selection
-    one = comparisons[0]
+    """Return the values of the template for cards, misfits, candidates, parameters, residuals."""
+    if report.diagnosis is None:
+        return dict.fromkeys(("cards", "fit", "candidates", "parameters"))
+    selection, first = report.diagnosis.selection, comparisons[0]
     return {
-        "fit": [
-            row
-            for s in comparisons
-            for row in tables.misfit_rows(report, s.label, s.dataset, s.runs)
-        ],
-        "noise": tables.format_noise(selection, one.runs.signals, one.units),
+        "cards": summary_cards(report, first.models[-1].whiteness),
+        "compared": first,
+        "noise": [format_significant(float(sd), 2) for sd in selection.base.noise_levels.outputs],
+        "significant": format_significant,
+        "percent": format_percent,
+        "fit": [row for one in comparisons for row in tables.misfit_rows(report, one)],
         "candidates": tables.candidate_rows(report, selection),
         "unfitted": tables.unfitted_candidates(report, selection),
         "other": format_probability(report.verdict.other),
-        "parameters": parameter_rows(report, selection),
-        "astray": format_biased_parameters(selection),
-        "whiteness": whiteness_rows(one.before, one.after, one.units, not selection.accepted),
-        "whiteness_of": one.label,
-        "left": describe_residuals(one.before, one.after, not selection.accepted),
-    }
-
-
-def _data_context(report: DiagnosisReport) -> dict[str, Any]:
-    """Return the values of the template for the recordings and their findings."""
-    return {
-        "unread": report.diagnosis.unread if report.diagnosis else (),
-        "findings": [
-            (s, tables.split_code_spans(text)) for s, text in format_findings(report.findings)
-        ],
-        "recordings": tables.recording_rows(report),
-        "untestable": tables.untestable_effects(report),
-        "fixed": format_fixed_parameters(report),
-        "thresholds": report.case.thresholds,
+        "parameters": tables.parameter_rows(report, selection),
+        "astray": tables.format_biased_parameters(selection),
     }

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from diagnosis.criterion.threshold import Thresholds
 from diagnosis.data_quality.finding import format_findings
 from diagnosis.localisation.location_text import PLACE_PHRASES, format_location
@@ -13,7 +11,6 @@ from diagnosis.report.number_text import format_probability, format_quantity
 from diagnosis.result.verdict import NamedEffect, verdict_id
 from diagnosis.selection.candidate_search import MIN_SCREENING_GAIN, CandidateFit
 from diagnosis.selection.forward_selection import Selection
-from diagnosis.validation.free_simulation import Misfit
 
 MAX_NAMED = 4
 """Maximum number of rivals, windows or findings in a sentence."""
@@ -78,24 +75,18 @@ def format_two_digits(value: float) -> str:
 
 def format_improvement(report: DiagnosisReport) -> str:
     """Return the misfits before and after and the confirmation in one line; "" without any."""
-    parts = [
-        f"{name.replace('_', ' ')}: {_format_misfits(signals)}"
-        for name, signals in report.verdict.fit.items()
-        if signals
-    ]
+    parts = []
+    for part, signals in report.verdict.fit.items():
+        found = []
+        for name, one in signals.items():
+            before, after = f"{100 * one.nrmse_before:.3g} %", f"{100 * one.nrmse_after:.3g} %"
+            found.append(f"{name} {before}" if before == after else f"{name} {before} to {after}")
+        if found:
+            parts.append(f"{part.replace('_', ' ')}: {', '.join(found)}")
     if not parts:
         return ""
     confirmed = {True: " - confirmed", False: " - not confirmed", None: ""}
     return f"misfit of free simulation, {'; '.join(parts)}{confirmed[report.verdict.confirmed]}"
-
-
-def _format_misfits(signals: Mapping[str, Misfit]) -> str:
-    """Return the misfit of each signal before and after, in per cent."""
-    found = []
-    for name, one in signals.items():
-        before, after = f"{100 * one.nrmse_before:.3g} %", f"{100 * one.nrmse_after:.3g} %"
-        found.append(f"{name} {before}" if before == after else f"{name} {before} to {after}")
-    return ", ".join(found)
 
 
 def format_missing_location(report: DiagnosisReport) -> str:

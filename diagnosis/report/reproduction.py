@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 import math
 import shlex
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from diagnosis.report.diagnosis_report import DiagnosisReport
+from diagnosis.report.model_comparison import ModelComparison
 from diagnosis.report.variant_file import missing_effects, variant_name
-from diagnosis.validation.worst_window import WorstWindow
+from language.model.automaton import Automaton
 from language.overlays.name_types import format_si_unit
 
 VARIANT = "variant.yaml"
@@ -20,43 +20,42 @@ WINDOW = "window.csv"
 SCENARIO = "scenario.yaml"
 
 
-def format_window_csv(window: WorstWindow, inputs: Mapping[str, str]) -> str:
+def format_window_csv(automaton: Automaton, comparison: ModelComparison) -> str:
     """Return `t_s`, inputs, recorded outputs and both simulations of a window as CSV in SI."""
-    seen = window.signals
-    names = ["t_s", *inputs, *seen]
+    window, seen = comparison.window, comparison.signals
+    names = ["t_s", *automaton.inputs, *seen]
     names += [f"{name}_{word}" for word in ("without", "with") for name in seen]
-    parts = (window.times[:, None], window.inputs, window.measured, window.before, window.after)
+    runs = window.runs[0], window.runs[-1]
     rows = [
         ",".join(f"{value:.9g}" if math.isfinite(value) else "" for value in row)
-        for row in np.concatenate(parts, axis=1)
+        for row in np.column_stack([window.times, window.inputs, window.measured, *runs])
     ]
     return "\n".join([",".join(names), *rows]) + "\n"
 
 
-def format_scenario(report: DiagnosisReport, window: WorstWindow) -> str:
+def format_scenario(report: DiagnosisReport, comparison: ModelComparison) -> str:
     """Return the YAML of a scenario that runs `variant.yaml` through `window.csv`.
 
     Inputs are held between samples; compared states start at their first recorded value.
     """
     automaton = report.automaton
-    fed = {name: format_si_unit(one.unit.dimension) for name, one in automaton.inputs.items()}
+    starts = [f"{n}: column({n})" for n in comparison.signals if n in automaton.states]
     lines = [
         "language: 1",
         f"scenario: {variant_name(report.name, '_window')}",
         f"of: {VARIANT}",
-        f"about: {json.dumps(window.title, ensure_ascii=False)}",
+        f"about: {json.dumps(comparison.window.title, ensure_ascii=False)}",
         "horizon: recording",
         "recording:",
         f"  file: {WINDOW}",
         "  time: {column: t_s, unit: s}",
         "  columns:",
     ]
-    lines += [f"    {n}: {{to: {n}, unit: {unit}, hold: previous}}" for n, unit in fed.items()]
-    starts = []
-    for name, unit in zip(window.signals, window.units, strict=True):
+    for name, one in automaton.inputs.items():
+        unit = format_si_unit(one.unit.dimension)
+        lines.append(f"    {name}: {{to: {name}, unit: {unit}, hold: previous}}")
+    for name, unit in zip(comparison.signals, comparison.units, strict=True):
         lines.append(f"    {name}: {{compare: {name}, unit: {unit}, blank: skip}}")
-        if name in automaton.states:
-            starts.append(f"{name}: column({name})")
     if starts:
         lines.append(f"initial: {{{', '.join(starts)}}}")
     return "\n".join(lines) + "\n"

@@ -1,129 +1,105 @@
-"""Tables: the tables of a report as texts."""
+"""Tables: the rows of the tables of a report, cells as texts."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from typing import Any
 
+from diagnosis.estimation.covariance import quantities_of
 from diagnosis.localisation.location import Location
+from diagnosis.localisation.location_text import MIN_CORRELATION
+from diagnosis.pipeline.parameter_fit import parameter_note
 from diagnosis.report import report_text as sentences
 from diagnosis.report.diagnosis_report import DiagnosisReport
+from diagnosis.report.model_comparison import ModelComparison
 from diagnosis.report.number_text import (
     format_change,
     format_percent,
     format_probability,
     format_significant,
+    format_with_std,
 )
-from diagnosis.selection.candidate_search import CandidateFit
 from diagnosis.selection.forward_selection import Selection
-from diagnosis.validation.whiteness import WhitenessTest
-from diagnosis.validation.worst_window import FreeRuns, rms_by_recording
+from language.text.document import MappingNode
+from language.text.node_edit import mapping_entries
+
+Cell = tuple[str, str, str, str]
+"""A misfit before and after, its change, and the trend: `better`, `worse` or `same`."""
 
 MAX_WINDOWS = 6
 
-MIN_CORRELATION = 0.3
-"""A smaller correlation is not shown."""
+MIN_BIAS, MIN_BIAS_STDS, MAX_BIASED = 0.03, 3.0, 5
+"""Relative bias and standard deviations from which parameters are biased; how many are named."""
 
 CHANGE_TOLERANCE = 0.02
 """Relative change of a misfit below which it is unchanged."""
 
 
-@dataclass(frozen=True)
-class Cell:
-    """A misfit before and after, its change, and the trend: `better`, `worse` or `same`."""
+def misfit_rows(
+    report: DiagnosisReport, comparison: ModelComparison
+) -> list[tuple[str, str, list[Cell], bool]]:
+    """Return recording, set, misfits [SI] by signal, and whether it is the sum, of each recording.
 
-    before: str
-    after: str
-    change: str
-    trend: str
-
-
-@dataclass(frozen=True)
-class FitRow:
-    """The misfits of one recording, or of a whole set, by signal."""
-
-    name: str
-    words: str
-    cells: tuple[Cell, ...]
-    is_sum: bool = False
-
-
-def misfit_rows(report: DiagnosisReport, label: str, dataset: str, runs: FreeRuns) -> list[FitRow]:
-    """Return the misfits [SI] of each recording of a set, then a sum row of normalised ones.
-
-    `dataset` is the key of the set in the verdict, `label` its name in words.
+    The sum row of normalised misfits is the last one.
     """
+    first, last = comparison.models[0].rms, comparison.models[-1].rms
     rows = []
-    for name, before, after in rms_by_recording(runs):
-        pairs = zip(before, after, strict=True)
-        cells = tuple(_misfit_cell(float(a), float(b), format_significant) for a, b in pairs)
-        rows.append(FitRow(name, label, cells))
-    whole = report.verdict.fit.get(dataset, {}).values()
-    sums = tuple(_misfit_cell(m.nrmse_before, m.nrmse_after, format_percent) for m in whole)
-    return [*rows, FitRow("all together, over the spread of the signal", label, sums, True)]
+    for name, *errors in zip(comparison.recordings, first, last, strict=True):
+        cells = [
+            misfit_cell(float(a), float(b), format_significant)
+            for a, b in zip(*errors, strict=True)
+        ]
+        rows.append((name, comparison.label, cells, False))
+    whole = report.verdict.fit.get(comparison.dataset, {}).values()
+    sums = [misfit_cell(m.nrmse_before, m.nrmse_after, format_percent) for m in whole]
+    return [*rows, ("all together, over the spread of the signal", comparison.label, sums, True)]
 
 
-def _misfit_cell(before: float, after: float, text: Callable[[float], str]) -> Cell:
+def misfit_cell(before: float, after: float, text: Callable[[float], str]) -> Cell:
     """Return the cell of a misfit; `text` formats its values. An unknown change is no trend."""
     is_known = before > 0.0 and math.isfinite(after)
     part = after / before - 1.0 if is_known else 0.0
     trend = "same" if abs(part) < CHANGE_TOLERANCE else "better" if part < 0.0 else "worse"
-    return Cell(text(before), text(after), format_change(before, after), trend)
+    return text(before), text(after), format_change(before, after), trend
 
 
-@dataclass(frozen=True)
-class CandidateRow:
-    """A candidate; `bar` is its gain in per cent of the largest one."""
+def candidate_rows(report: DiagnosisReport, selection: Selection) -> list[dict[str, Any]]:
+    """Return the rows of fitted candidates: accepted ones, then the others of the first round.
 
-    effect: str
-    place: str
-    gain: str
-    share: str
-    probability: str
-    bar: float
-    reason: str
-    is_accepted: bool
-
-
-def candidate_rows(report: DiagnosisReport, selection: Selection) -> list[CandidateRow]:
-    """Return the rows of fitted candidates: accepted ones, then the others of the first round."""
+    They have `effect`, `place`, `gain`, `share`, `probability`, `reason` and `is_accepted`; `bar`
+    is the gain in per cent of the largest one.
+    """
     ids = {one.placed_effect.id for one in selection.accepted}
     first = [one for one in selection.first_round if one.placed_effect.id not in ids]
     listed = [one for one in (*selection.accepted, *first) if one.is_fitted]
     most = max([one.gain for one in listed] + [1.0])
-    shares = selection.probabilities()
-    return [_candidate_row(report, selection, one, k, most, shares) for k, one in enumerate(listed)]
-
-
-def _candidate_row(
-    report: DiagnosisReport,
-    selection: Selection,
-    candidate_fit: CandidateFit,
-    rank: int,
-    largest: float,
-    shares: Mapping[str, float],
-) -> CandidateRow:
-    """Return the row of a candidate at a rank."""
-    own = candidate_fit.placed_effect
-    share = shares.get(own.id)
-    is_accepted = own.id in {one.placed_effect.id for one in selection.accepted}
-    reason = sentences.format_reason(candidate_fit, rank, selection, report.case.thresholds)
-    if is_accepted and report.verdict.verdict == "ambiguous":
-        reason = "best, but not separated from others: applied in the model shown here"
-    if is_accepted and report.verdict.verdict == "unknown":
-        reason = "a formula, no effect of the library: applied in the model shown here"
-    effect, _, place = sentences.candidate_title(own, report).partition("@")
-    return CandidateRow(
-        effect,
-        place,
-        f"{candidate_fit.gain:.0f}" if math.isfinite(candidate_fit.gain) else "diverges",
-        f"{100.0 * max(candidate_fit.share, 0.0):.0f} %",
-        "" if share is None else format_probability(share),
-        100.0 * max(candidate_fit.gain, 0.0) / largest,
-        reason,
-        is_accepted,
-    )
+    probabilities = selection.probabilities()
+    accepted_reasons = {
+        "ambiguous": "best, but not separated from others: applied in the model shown here",
+        "unknown": "a formula, no effect of the library: applied in the model shown here",
+    }
+    rows = []
+    for rank, one in enumerate(listed):
+        own = one.placed_effect
+        probability = probabilities.get(own.id)
+        effect, _, place = sentences.candidate_title(own, report).partition("@")
+        reason = sentences.format_reason(one, rank, selection, report.case.thresholds)
+        if own.id in ids:
+            reason = accepted_reasons.get(report.verdict.verdict, reason)
+        rows.append(
+            {
+                "effect": effect,
+                "place": place,
+                "gain": f"{one.gain:.0f}" if math.isfinite(one.gain) else "diverges",
+                "share": f"{100.0 * max(one.share, 0.0):.0f} %",
+                "probability": "" if probability is None else format_probability(probability),
+                "bar": 100.0 * max(one.gain, 0.0) / most,
+                "reason": reason,
+                "is_accepted": own.id in ids,
+            }
+        )
+    return rows
 
 
 def unfitted_candidates(
@@ -173,63 +149,68 @@ def recording_rows(report: DiagnosisReport) -> list[tuple[str, ...]]:
     return rows
 
 
-def untestable_effects(report: DiagnosisReport) -> list[tuple[str, str]]:
-    """Return what recordings lack, each with the effects that need it."""
-    lacking: dict[str, list[str]] = {}
-    for one in report.check.excitation.effects:
-        if one.lacking:
-            lacking.setdefault(" and ".join(one.lacking), []).append(one.effect)
-    return [(needs, ", ".join(names)) for needs, names in lacking.items()]
-
-
-def format_noise(selection: Selection, signals: Sequence[str], units: Sequence[str]) -> str:
-    """Return the noise of the recorded signals in the base: `w 0.12 rad/s, T 3.0 N*m`."""
-    noise = [format_significant(float(sd), 2) for sd in selection.base.noise_levels.outputs]
-    parts = zip(signals, noise, units, strict=True)
-    return ", ".join(f"{name} {sd} {unit}" for name, sd, unit in parts)
-
-
 def split_code_spans(text: str) -> list[tuple[str, bool]]:
     """Return the parts of a sentence between back quotes, with whether each was quoted."""
     return [(part, place % 2 == 1) for place, part in enumerate(text.split("`"))]
 
 
-def whiteness_rows(
-    before: Sequence[WhitenessTest],
-    after: Sequence[WhitenessTest],
-    units: Sequence[str],
-    is_base_only: bool,
-) -> list[tuple[str, ...]]:
-    """Return signal, model, rms, predictable fraction, lags outside, p-value and rating.
+def parameter_rows(report: DiagnosisReport, selection: Selection) -> list[tuple[str, ...]]:
+    """Return the rows of the parameters of the final model.
 
-    There is a row for each signal and model, the base first.
+    They have name, unit, declared, recalibrated and final value, change, description and note.
     """
-    models = [("recalibrated", before)] if is_base_only else [("without", before), ("with", after)]
+    before, after = quantities_of(selection.base), quantities_of(selection.model)
+    effect_abouts = {
+        tried.placed_effect.qualified_name(entry.key): entry.node.text_of("about")
+        for tried in selection.accepted
+        for entry in mapping_entries(tried.placed_effect.effect.body.get("parameters"))
+        if isinstance(entry.node, MappingNode)
+    }
+    coordinates = {one.name: one for one in selection.model.candidate.free_parameters}
     rows: list[tuple[str, ...]] = []
-    for k, unit in enumerate(units):
-        for words, found in models:
-            one = found[k]
-            chance = "< 0.001" if one.p_value < 0.001 else f"{one.p_value:.2g}"
-            size = f"{format_significant(one.rms)} {unit}"
-            part = format_percent(one.predictable_fraction)
-            outside = f"{one.lags_outside_band} of {len(one.lags)}"
-            rows.append((one.signal, words, size, part, outside, chance, one.rating))
+    for name, now in after.items():
+        declared = report.automaton.parameters.get(name)
+        value = None if declared is None or declared.value is None else float(declared.value)
+        rows.append(
+            (
+                name,
+                "" if now.unit == "1" else now.unit,
+                "new" if value is None else f"{value:.5g}",
+                format_with_std(before[name].value, before[name].std) if name in before else "",
+                format_with_std(now.value, now.std),
+                format_change(value, now.value) if value is not None and value > 0.0 else "",
+                _about_of(report, name) or effect_abouts.get(name, ""),
+                parameter_note(now, coordinates[name]),
+            )
+        )
     return rows
 
 
-def describe_residuals(
-    before: Sequence[WhitenessTest], after: Sequence[WhitenessTest], is_base_only: bool
-) -> list[tuple[str, str]]:
-    """Return each signal with the rating and the predictable fraction of what is left."""
-    ratings = {
-        "white": "noise",
-        "nearly white": "next to nothing but noise",
-        "coloured": "not noise alone: something else is still missing, or slow",
-    }
+def format_biased_parameters(selection: Selection) -> str:
+    """Return `name +12 %, ...`: how far the fit without effects moves parameters."""
+    before, after = quantities_of(selection.base), quantities_of(selection.model)
     found = []
-    for old, new in zip(before, after, strict=True):
-        was = "" if is_base_only else f" (without {format_percent(old.predictable_fraction)})"
-        part = f"{format_percent(new.predictable_fraction)} of it"
-        text = f"{ratings[new.rating]}; {part} is predictable from its past{was}"
-        found.append((new.signal, text))
-    return found
+    for name, one in before.items():
+        now = after.get(name)
+        if now is None or now.value <= 0.0 or one.value <= 0.0:
+            continue
+        part = one.value / now.value - 1.0
+        if abs(part) >= MIN_BIAS and abs(one.value - now.value) > MIN_BIAS_STDS * now.std:
+            found.append((abs(part), f"{name} {format_change(now.value, one.value)}"))
+    return ", ".join(text for _, text in sorted(found, reverse=True)[:MAX_BIASED])
+
+
+def _about_of(report: DiagnosisReport, name: str) -> str:
+    """Return the text of `about` of a parameter of the spec; "" if there is none."""
+    table = report.case.document.root.get("parameters")
+    entry = table.get(name) if isinstance(table, MappingNode) else None
+    return entry.text_of("about") if isinstance(entry, MappingNode) else ""
+
+
+def format_fixed_parameters(report: DiagnosisReport) -> list[str]:
+    """Return `name = value` [SI] of each real parameter without a range."""
+    return [
+        f"{name} = {float(one.value):.5g}"
+        for name, one in report.automaton.parameters.items()
+        if one.range is None and one.value is not None and one.type == "real"
+    ]

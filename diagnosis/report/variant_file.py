@@ -12,7 +12,6 @@ from diagnosis.model.parameter import format_value
 from diagnosis.model.placed_effect import automaton_with_effects, effect_names
 from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.report_text import format_two_digits
-from diagnosis.selection.candidate_search import CandidateFit
 from diagnosis.selection.forward_selection import Selection
 from language.model.automaton import Automaton
 from language.overlays.effect_reader import Effect
@@ -98,48 +97,38 @@ def _parameter_lines(automaton: Automaton, fitted: Mapping[str, Quantity]) -> li
 def _effect_lines(
     report: DiagnosisReport, selection: Selection, fitted: Mapping[str, Quantity]
 ) -> list[str]:
-    """Return the lines of the accepted effects."""
-    if not selection.accepted:
-        return []
-    placed_effects = selection.model.candidate.placed_effects
-    whole = automaton_with_effects(report.case.document, report.case.project, placed_effects)
-    lines = ["effects:"]
-    for tried in selection.accepted:
-        lines += _single_effect_lines(tried, whole, selection, fitted)
-    return lines
-
-
-def _single_effect_lines(
-    candidate_fit: CandidateFit,
-    whole: Automaton,
-    selection: Selection,
-    fitted: Mapping[str, Quantity],
-) -> list[str]:
-    """Return the lines of an effect with its fitted values.
+    """Return the lines of the accepted effects with their fitted values.
 
     A parameter per recording has its mean. Multiples of a magnitude that are not fitted are written
     too: a variant has no recordings.
     """
-    placed_effect = candidate_fit.placed_effect
-    own_names = effect_names(placed_effect)
-    lines = [f"  {placed_effect.id}:  # {placed_effect.effect.about}"]
-    each = [selection.model.values(k) for k in range(len(selection.model.point.per_recording))]
-    values = []
-    for final, quantity in fitted.items():
-        parameter = whole.parameters.get(final)
-        if final not in own_names or parameter is None:
-            continue
-        text = format_value(quantity.value, parameter)
-        note = f"sd {format_two_digits(quantity.std)}"
-        if parameter.fitting.per == "recording":
-            note = "mean of " + ", ".join(f"{one[final]:.4g}" for one in each)
-        values.append(f"      {own_names[final]}: {text}  # {note}")
-    for entry in mapping_entries(placed_effect.effect.body.get("parameters")):
-        final = placed_effect.qualified_name(entry.key)
-        parameter = whole.parameters.get(final)
-        is_scaled = isinstance(entry.node, MappingNode) and "scale" in entry.node.entries
-        if is_scaled and final not in fitted and parameter is not None:
-            assert parameter.value is not None
-            text = format_value(float(parameter.value), parameter)
-            values.append(f"      {entry.key}: {text}  # from the recordings")
-    return [*lines, "    values:", *values] if values else [f"  {placed_effect.id}: {{}}"]
+    if not selection.accepted:
+        return []
+    model, lines = selection.model, ["effects:"]
+    each = [model.values(k) for k in range(len(model.point.per_recording))]
+    parameters = automaton_with_effects(
+        report.case.document, report.case.project, model.candidate.placed_effects
+    ).parameters
+    for one in (tried.placed_effect for tried in selection.accepted):
+        own_names, values = effect_names(one), []
+        for final, quantity in fitted.items():
+            if final not in own_names or final not in parameters:
+                continue
+            text = format_value(quantity.value, parameters[final])
+            note = f"sd {format_two_digits(quantity.std)}"
+            if parameters[final].fitting.per == "recording":
+                note = "mean of " + ", ".join(f"{known[final]:.4g}" for known in each)
+            values.append(f"      {own_names[final]}: {text}  # {note}")
+        for entry in mapping_entries(one.effect.body.get("parameters")):
+            final = one.qualified_name(entry.key)
+            is_scaled = isinstance(entry.node, MappingNode) and "scale" in entry.node.entries
+            if is_scaled and final not in fitted and final in parameters:
+                value = parameters[final].value
+                assert value is not None
+                text = format_value(float(value), parameters[final])
+                values.append(f"      {entry.key}: {text}  # from the recordings")
+        if values:
+            lines += [f"  {one.id}:  # {one.effect.about}", "    values:", *values]
+        else:
+            lines.append(f"  {one.id}: {{}}")
+    return lines

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -61,10 +62,13 @@ class Verdict:
     inputs: Mapping[str, str] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
-        """Return the content of `verdict.json`, with the locations that gain or are accepted."""
+        """Return the content of `verdict.json`, with the locations that gain or are accepted.
+
+        Numbers that are not finite are None.
+        """
         locations = [one for one in self.location if one.gain > 0.0 or one.is_accepted]
         worst = locations[0] if locations else None
-        return {
+        found = {
             "format": FORMAT,
             "verdict": self.verdict,
             "effects": [dataclasses.asdict(one) for one in self.effects],
@@ -90,6 +94,16 @@ class Verdict:
             "inputs": dict(self.inputs),
             "runtime_s": self.runtime_s,
         }
+        return {key: replace_non_finite(value) for key, value in found.items()}
+
+
+def replace_non_finite(value: Any) -> Any:
+    """Return dicts and lists with None in place of floats that are not finite."""
+    if isinstance(value, dict):
+        return {key: replace_non_finite(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [replace_non_finite(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 VERDICT_ALIASES = {

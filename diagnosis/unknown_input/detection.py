@@ -1,7 +1,8 @@
 """Unknown input: a force or torque that acts in windows, such as a brake or an impact.
 
 It is found as a free disturbance in a balance. As that explains anything, it must be small most of
-the time and independent of what is known.
+the time and independent of what is known. An input that is free everywhere also absorbs the error
+of a wrong mass or drag, so parameters are estimated where it does not act.
 """
 
 from __future__ import annotations
@@ -9,14 +10,25 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.criterion.effective_sample_size import autocorrelation_sum
 from diagnosis.data.array_types import Reals
 from diagnosis.data.noise_estimate import MAD_TO_STD
-from diagnosis.estimation.estimate import Estimate, with_normal_equations
+from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.data.stacked_recordings import burn_in_samples
+from diagnosis.estimation.estimate import Estimate, evaluate, with_normal_equations
+from diagnosis.estimation.levenberg_marquardt import estimate_parameters
 from diagnosis.estimation.model_set import ModelSet
+from diagnosis.estimation.noise_level import ORDINARY_LEVEL, disturbance_units
+from diagnosis.localisation.disturbance_state_fit import (
+    ALL_LEVELS,
+    scan_level,
+    with_disturbance_levels,
+)
 from diagnosis.localisation.location import (
     DisturbanceEstimate,
     Location,
@@ -24,13 +36,14 @@ from diagnosis.localisation.location import (
     with_smoothed_disturbances,
 )
 from diagnosis.localisation.ranking import localise
+from diagnosis.model.parameter_vector import ParameterVector
 from diagnosis.model.placed_effect import PlacedEffect, find_placements
 from diagnosis.selection.candidate_search import CandidateFit
 from diagnosis.selection.forward_selection import Selection
 from diagnosis.selection.intersample import LogCallback
 from diagnosis.unknown_input.dependence import input_dependence, standstill_dependence
-from diagnosis.unknown_input.inactive_interval import refit_on_inactive_intervals
 
+Booleans = NDArray[np.bool_]
 ENERGY_FRACTION = 0.8
 """Part of the squares of a disturbance that its largest samples have."""
 GAUSSIAN_FRACTION, GAUSSIAN_FRACTION_STD = 0.316, 0.286
@@ -51,6 +64,12 @@ MAX_INPUT_DEPENDENCE = 0.4
 """Correlation of its amplitude with the movement of known inputs above which it is a response."""
 MAX_STANDSTILL_DEPENDENCE = 0.7
 """Correlation of its amplitude with standstill above which it is an error of a friction."""
+MARGIN = 2.5
+"""Reference times before and after an active interval that do not count as inactive."""
+MIN_DURATION = 10.0
+"""Shortest inactive interval, in reference times; the observer must find the states in it."""
+MIN_INACTIVE_FRACTION = 1.0 / 3.0
+"""Smallest fraction of the samples that is inactive, for parameters to follow from it."""
 
 
 def detect_unknown_input(
@@ -134,10 +153,10 @@ def _refit_on_inactive_intervals(
     is_inactive = [np.abs(one.values) < least for one in location.disturbances]
     series, state = model_set.series, location.disturbance_state
     active = [~one for one in is_inactive]
-    free_model = refit_on_inactive_intervals(free_model, series, active, state)
+    free_model = _fit_outside_active(free_model, series, active, state)
     location = _with_free_model(model_set, location, free_model)
     active = [one.is_significant for one in location.disturbances]
-    again = refit_on_inactive_intervals(free_model, series, active, state)
+    again = _fit_outside_active(free_model, series, active, state)
     if again.cost < free_model.cost:
         location = _with_free_model(model_set, location, again)
     pairs = zip(location.disturbances, is_inactive, strict=True)
@@ -145,6 +164,63 @@ def _refit_on_inactive_intervals(
     scale = max(1.0, MAD_TO_STD * float(np.median(ratios)))
     wider = (DisturbanceEstimate(one.values, scale * one.stds) for one in location.disturbances)
     return with_disturbances(model_set, location, tuple(wider))
+
+
+def _fit_outside_active(
+    model: Estimate, series: Sequence[SampledRecording], active: Sequence[Booleans], name: str
+) -> Estimate:
+    """Return a model with the disturbance `name` free, fitted on its inactive intervals.
+
+    `active` (samples,) of each recording begins after its burn-in. The model is returned unchanged
+    if the intervals are too short.
+    """
+    pieces, places = _inactive_recordings(series, active)
+    if sum(one.count for one in pieces) < MIN_INACTIVE_FRACTION * sum(one.count for one in series):
+        return model
+    units = disturbance_units(model.candidate, series, model.values(0))
+    recording_indices = [places.index(r) if r in places else 0 for r in range(len(series))]
+    start = ParameterVector(model.point.shared, model.point.per_recording[places])
+    ordinary = with_disturbance_levels(
+        model.noise_levels, units, dict.fromkeys(units, ORDINARY_LEVEL)
+    )
+    best = estimate_parameters(model.candidate, pieces, ordinary, start)
+    point = ParameterVector(best.point.shared, best.point.per_recording[recording_indices])
+    free = evaluate(model.candidate, series, ordinary, point)
+    return scan_level(free, series, units, name, ALL_LEVELS)
+
+
+def _inactive_recordings(
+    series: Sequence[SampledRecording], active: Sequence[Booleans]
+) -> tuple[list[SampledRecording], list[int]]:
+    """Return inactive intervals, the longest first, and the index of their recordings."""
+    found = []
+    for r, (one, there) in enumerate(zip(series, active, strict=True)):
+        around = np.ones(2 * one.sample_count(MARGIN) + 1)
+        whole = np.pad(there, (burn_in_samples(one), 0)).astype(float)
+        near = np.convolve(whole, around, "same") > 0.5
+        found += [(part, r) for part in _inactive_parts(one, near)]
+    found.sort(key=lambda pair: -pair[0].count)
+    return [part for part, _ in found], [r for _, r in found]
+
+
+def _inactive_parts(series: SampledRecording, active: Booleans) -> list[SampledRecording]:
+    """Return the inactive parts of a recording; each begins where all outputs are measured."""
+    edges = [0, *(np.flatnonzero(np.diff(active)) + 1).tolist(), series.count]
+    known = np.flatnonzero(np.all(np.isfinite(series.measured), axis=1))
+    found = []
+    for low, high in pairwise(edges):
+        first = known[np.searchsorted(known, low) :][:1]
+        if not active[low] and len(first) and high - first[0] >= series.sample_count(MIN_DURATION):
+            part = slice(int(first[0]), high)
+            found.append(
+                dataclasses.replace(
+                    series,
+                    start=series.start + series.period * part.start,
+                    inputs=np.ascontiguousarray(series.inputs[part]),
+                    measured=np.ascontiguousarray(series.measured[part]),
+                )
+            )
+    return found
 
 
 def _with_free_model(model_set: ModelSet, location: Location, free_model: Estimate) -> Location:

@@ -94,29 +94,20 @@ class Oscillation:
             return f"{self.signal} fits to the end, {self.length:.2f} s {begin}"
         measured = self.recorded.mean_frequency_after(self.followed_time)
         model = self.simulated.mean_frequency_after(self.followed_time)
+        text = f"{self.signal} fits until t = {self.followed_time:.2f} s {begin}"
         if not (np.isfinite(measured) and np.isfinite(model)):
-            return f"{self.signal} fits until t = {self.followed_time:.2f} s {begin}"
-        text = (
-            f"{self.signal} fits until t = {self.followed_time:.2f} s {begin}, then the shuffle's "
-            f"frequency is {measured:.2f} Hz in the recording and {model:.2f} Hz in the model"
-        )
-        return text + self._format_trend() + self._format_damping()
-
-    def _format_trend(self) -> str:
-        """Return both trends of frequency with amplitude; "" if they agree."""
-        more = [one.frequency_trend() for one in (self.recorded, self.simulated)]
-        if not all(np.isfinite(more)) or abs(more[0] - more[1]) < FREQUENCY_TOLERANCE:
-            return ""
-        word = "growing" if more[0] > more[1] else "falling"
-        parts = [f"{100.0 * one:+.0f} %" for one in more]
-        return f", {word} as the amplitude falls ({parts[0]}, in the model {parts[1]})"
-
-    def _format_damping(self) -> str:
-        """Return both damping ratios; "" if they agree."""
-        dampings = [100.0 * one.damping_ratio() for one in (self.recorded, self.simulated)]
-        if not all(np.isfinite(dampings)) or abs(dampings[0] - dampings[1]) < 0.5:
-            return ""
-        return f"; its damping {dampings[0]:.1f} % and {dampings[1]:.1f} %"
+            return text
+        text += f", then the shuffle's frequency is {measured:.2f} Hz in the recording"
+        text += f" and {model:.2f} Hz in the model"
+        first, second = (one.frequency_trend() for one in (self.recorded, self.simulated))
+        if abs(first - second) >= FREQUENCY_TOLERANCE:  # false for NaN
+            word = "growing" if first > second else "falling"
+            parts = f"{100.0 * first:+.0f} %, in the model {100.0 * second:+.0f} %"
+            text += f", {word} as the amplitude falls ({parts})"
+        first, second = (100.0 * one.damping_ratio() for one in (self.recorded, self.simulated))
+        if abs(first - second) >= 0.5:
+            text += f"; its damping {first:.1f} % and {second:.1f} %"
+        return text
 
 
 def analyse_oscillation(model: Estimate, series: Sequence[SampledRecording]) -> Oscillation | None:

@@ -9,8 +9,9 @@ from rich.table import Table
 
 from diagnosis.model.parameter import in_unit
 from diagnosis.pipeline.parameter_fit import STRONG_CORRELATION, Fit
-from diagnosis.report.diagnosis_report import DiagnosisReport, replace_non_finite
+from diagnosis.report.diagnosis_report import DiagnosisReport
 from diagnosis.report.report_text import format_two_digits, summary_lines
+from diagnosis.result.verdict import replace_non_finite
 from modewright.runtime.json_format import format_entry
 
 

@@ -88,11 +88,7 @@ def _print_excitation(screen: Console, excitation: Excitation) -> None:
             screen.print(escape(text), highlight=False)
     testable = [effect.effect for effect in excitation.effects if effect.is_testable]
     screen.print(f"\nthese data can test {', '.join(testable) or 'no effect'}", highlight=False)
-    untestable: dict[str, list[str]] = {}
-    for effect in excitation.effects:
-        if effect.lacking:
-            untestable.setdefault(" and ".join(effect.lacking), []).append(effect.effect)
-    for lacking, effects in untestable.items():
+    for lacking, effects in excitation.untestable.items():
         screen.print(f"not {', '.join(effects)}: needs {lacking}", highlight=False)
 
 

@@ -107,14 +107,13 @@ def diagnose(
 
 def _print_report(report: DiagnosisReport, out: Path, as_json: bool) -> None:
     """Print the report of a diagnosis as JSON or as text."""
-    from diagnosis.report.diagnosis_report import verdict_to_json
     from diagnosis.report.variant_file import missing_effect_notes
     from modewright.render import diagnosis as show_diagnosis, run as show
 
     for text in missing_effect_notes(report):
         print(f"note: {text}", file=sys.stderr)
     if as_json:
-        show.print_json(verdict_to_json(report.verdict))
+        show.print_json(report.verdict.to_json())
     else:
         show_diagnosis.print_diagnosis(console(), report)
         report_written_files([out / "report.html"])

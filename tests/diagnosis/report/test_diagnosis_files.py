@@ -24,7 +24,6 @@ import pytest
 
 import modewright as mw
 from diagnosis.estimation.checkpoint import FitCache, hash_of
-from diagnosis.report.diagnosis_report import verdict_to_json
 from diagnosis.report.variant_file import missing_effect_notes
 from modewright.api.diagnosis import base_reference
 from tests.diagnosis.rotor_project import (
@@ -276,7 +275,7 @@ def dossier(found: Found) -> mw.DiagnosisReport:
 
 def test_killed_and_run_again_it_says_the_same(found: Found, dossier: mw.DiagnosisReport) -> None:
     """The fixture's first run was killed."""
-    again = verdict_to_json(dossier.verdict)
+    again = dossier.verdict.to_json()
     assert {**again, "runtime_s": 0} == {**found.verdict, "runtime_s": 0}
 
 

@@ -13,7 +13,6 @@ import modewright as mw
 from diagnosis.data_quality.finding import Finding
 from diagnosis.pipeline.usable_recordings import usable_recordings
 from diagnosis.report import report_text as wording
-from diagnosis.report.diagnosis_report import verdict_to_json
 from diagnosis.report.report_files import report_files
 from diagnosis.report.report_text import format_headline, format_separation
 from modewright.api.recordings import held_out_findings
@@ -37,7 +36,7 @@ def test_what_cannot_be_told_apart_is_told_with_what_would_separate_it(
     doubt = dataclasses.replace(
         dossier.verdict, verdict="ambiguous", effects=(), ambiguous_with=(*effects, rival)
     )
-    jsonschema.validate(verdict_to_json(doubt), SCHEMA)
+    jsonschema.validate(doubt.to_json(), SCHEMA)
     doubtful = dataclasses.replace(dossier, verdict=doubt)
     told = format_headline(doubtful)
     assert "cannot tell which" in told

@@ -12,7 +12,6 @@ import time
 from pathlib import Path
 
 import modewright
-from diagnosis.report.diagnosis_report import verdict_to_json
 
 SPEC = "blind_driveline"
 WHO = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
@@ -27,7 +26,7 @@ def main() -> None:
     spent = sum(use.ru_utime + use.ru_stime for use in map(resource.getrusage, WHO))
     seconds = {"cpu_s": spent, "wall_s": time.monotonic() - begun}
     temporary = result.with_suffix(".tmp")
-    temporary.write_text(json.dumps({"verdict": verdict_to_json(found.verdict), **seconds}))
+    temporary.write_text(json.dumps({"verdict": found.verdict.to_json(), **seconds}))
     temporary.replace(result)
 
 

@@ -17,8 +17,7 @@ from diagnosis.model.effect_library import library_effects
 from diagnosis.model.placed_effect import place_path
 from diagnosis.pipeline.decision import DiagnosisDecision, decide
 from diagnosis.pipeline.diagnosis_case import Case, build_model_set, read_series
-from diagnosis.report.diagnosis_report import replace_non_finite
-from diagnosis.result.verdict import verdict_id
+from diagnosis.result.verdict import replace_non_finite, verdict_id
 from diagnosis.selection.candidate_search import CandidateFit
 from language.loading.load import automaton_of
 from language.loading.recording_map_reader import read_map

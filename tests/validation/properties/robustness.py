@@ -50,7 +50,6 @@ ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH"
 PYTHON = """\
 import json, sys
 import modewright
-from diagnosis.report.diagnosis_report import verdict_to_json
 from language.text.diagnostic import SpecError
 spec, mapping, effects, train, held_out, anyway = json.loads(sys.argv[1])
 try:
@@ -59,7 +58,7 @@ except (SpecError, ValueError) as error:
     print(f"{type(error).__name__}: {error}", file=sys.stderr)
     sys.exit(1)
 print(*found.verdict.messages, *(one.text for one in found.findings), sep="\\n")
-print(json.dumps(verdict_to_json(found.verdict), allow_nan=False))
+print(json.dumps(found.verdict.to_json(), allow_nan=False))
 """
 NON_FINITE = re.compile(r"(?<![\w.`'\"#-])[-+]?(?:nan|inf|NaN|Infinity|None)(?:%| %|(?![\w.`'\"]))")
 """A number that is not finite, or None, as a word of a sentence or a cell of a table."""

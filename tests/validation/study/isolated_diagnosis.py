@@ -37,7 +37,7 @@ def main() -> None:
     given = _parser().parse_args()
     sys.addaudithook(guard(_end))
     import modewright
-    from diagnosis.report.diagnosis_report import replace_non_finite, verdict_to_json
+    from diagnosis.result.verdict import replace_non_finite
     from tests.validation.study.decision_record import record_decision
 
     begun = time.monotonic()
@@ -52,7 +52,7 @@ def main() -> None:
     own, compilers = (use.ru_utime + use.ru_stime for use in map(resource.getrusage, WHO))
     wall = time.monotonic() - begun
     result = {
-        "verdict": verdict_to_json(found.verdict),
+        "verdict": found.verdict.to_json(),
         "cpu_s": own + compilers,
         "compiler_s": compilers,
         "wall_s": wall,

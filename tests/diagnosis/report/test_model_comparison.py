@@ -8,10 +8,10 @@ from fractions import Fraction
 import numpy as np
 
 from diagnosis.data.sampled_recording import SampledRecording
+from diagnosis.report.model_comparison import rms_of_free_parts
 from diagnosis.report.number_text import format_significant
-from diagnosis.report.tables import _misfit_cell
+from diagnosis.report.tables import misfit_cell
 from diagnosis.validation.free_simulation import is_free
-from diagnosis.validation.worst_window import FreeRuns, rms_by_recording
 
 
 def recording(count: int) -> SampledRecording:
@@ -25,13 +25,13 @@ def test_an_error_without_values_is_unknown() -> None:
     runs = [np.where(np.isnan(one.measured), 0.0, one.measured + 2.0) for one in (short, long)]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found = rms_by_recording(FreeRuns((short, long), runs, runs, ("w", "v")))
-    assert np.isnan(found[0][1]).all()
-    np.testing.assert_allclose(found[1][1], [2.0, np.nan])
+        found = [rms_of_free_parts(*pair) for pair in zip((short, long), runs, strict=True)]
+    assert np.isnan(found[0]).all()
+    np.testing.assert_allclose(found[1], [2.0, np.nan])
 
 
 def test_an_unknown_change_is_no_trend() -> None:
-    cell = _misfit_cell(2.0, np.nan, format_significant)
-    assert (cell.before, cell.after, cell.trend) == ("2.00", "-", "same")
-    assert _misfit_cell(np.nan, 1.0, format_significant).trend == "same"
-    assert _misfit_cell(2.0, 1.0, format_significant).trend == "better"
+    before, after, _, trend = misfit_cell(2.0, np.nan, format_significant)
+    assert (before, after, trend) == ("2.00", "-", "same")
+    assert misfit_cell(np.nan, 1.0, format_significant)[-1] == "same"
+    assert misfit_cell(2.0, 1.0, format_significant)[-1] == "better"
