@@ -12,46 +12,10 @@ from scipy.signal import welch
 
 from diagnosis.data.array_types import Reals
 from diagnosis.data_quality.channel import ChannelCheck, check_channel
+from diagnosis.model.placed_effect import shipped_effects
 from engine.recordings.recording import Channel, Recording, split_by_windows
 from language.expressions.units import PURE_NUMBER, are_compatible, parse_unit
 from language.loading.recording_map_reader import column_dimension
-
-EFFECT_NEEDS: Mapping[str, tuple[str, ...]] = {
-    "actuator_delay": ("fast",),
-    "actuator_lag": ("fast",),
-    "added_inertia": ("fast", "sampled_fast"),
-    "backlash": ("torque_reverses",),
-    "brake_drag": ("brakes",),
-    "clock_offset": ("fast",),
-    "compliance": ("fast", "sampled_fast"),
-    "coulomb_friction": ("speed_reverses",),
-    "load_dependent_loss": ("both_signs",),
-    "mount_compliance": ("fast", "sampled_fast"),
-    "position_dependent_stiffness": ("turns", "moves"),
-    "quadratic_drag": ("speed_range",),
-    "road_grade": ("moves",),
-    "second_gap": ("torque_reverses", "sampled_fast"),
-    "sensor_delay": ("fast",),
-    "sensor_eccentricity": ("turns",),
-    "sensor_lag": ("fast",),
-    "sensor_offset": ("speed_range",),
-    "sensor_quantisation": ("moves",),
-    "sensor_scale": ("speed_range",),
-    "stiffness_hysteresis": ("two_sizes",),
-    "stiffness_nonlinear": ("two_sizes",),
-    "stribeck_friction": ("speed_reverses",),
-    "torque_derating": ("power",),
-    "torque_drift": ("long",),
-    "torque_gain": ("both_signs",),
-    "torque_offset": ("speed_reverses",),
-    "torque_rate_limit": ("two_sizes",),
-    "torque_ripple": ("turns", "sampled_fast"),
-    "tyre_slip": ("fast", "speed_range"),
-    "unequal_half_shafts": ("torque_reverses", "sampled_fast"),
-    "unknown_input": ("moves",),
-    "viscous_friction": ("speed_range",),
-}
-"""The needs of each effect of the library on the excitation."""
 
 NEED_DESCRIPTIONS: Mapping[str, str] = {
     "fast": "steps or a sweep to 5 Hz or more",
@@ -167,8 +131,8 @@ def analyse_excitation(
         inputs = [s for s in speeds if used[0].channels[s.name].column.to is not None]
     met = _met_needs(used, inputs, speeds, checks)
     effects = tuple(
-        EffectTestability(effect, tuple(NEED_DESCRIPTIONS[n] for n in needs if n not in met))
-        for effect, needs in EFFECT_NEEDS.items()
+        EffectTestability(one.name, tuple(NEED_DESCRIPTIONS[n] for n in one.needs if n not in met))
+        for one in shipped_effects()
     )
     total = sum(float(piece.end - piece.start) for piece in used)
     return Excitation(total, tuple(inputs), tuple(speeds), effects)

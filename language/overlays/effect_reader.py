@@ -25,7 +25,7 @@ from language.text.node_edit import mapping_entries
 EffectLookup = Callable[[str, Span], Document]
 """Returns the document of the effect of a name; the span is where the name is written."""
 
-DESCRIPTION_KEYS = ("family", "signature", "confused_with", "separated_by", "references")
+DESCRIPTION_KEYS = ("family", "signature", "confused_with", "separated_by", "needs", "references")
 """Keys of an effect with texts for reports."""
 ADDED_SECTIONS = (
     "parameters",
@@ -106,6 +106,7 @@ class Effect:
     signature: str
     confused_with: tuple[str, ...]
     separated_by: tuple[str, ...]
+    needs: tuple[str, ...]
     references: tuple[str, ...]
     span: Span
     family: str = ""
@@ -250,6 +251,7 @@ class _EffectReader(Reader):
             signature=signature.text if isinstance(signature, ScalarNode) else "",
             confused_with=self._read_texts(tree, "confused_with"),
             separated_by=self._read_texts(tree, "separated_by"),
+            needs=self._read_texts(tree, "needs"),
             references=self._read_texts(tree, "references"),
             span=document.name_span,
             family=tree.text_of("family") or document.name,

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from diagnosis.data_quality.excitation import EFFECT_NEEDS, NEED_DESCRIPTIONS
+from diagnosis.data_quality.excitation import NEED_DESCRIPTIONS
 from diagnosis.data_quality.finding import Finding, format_findings
 from diagnosis.data_quality.model_agreement import OutputAgreement, compare_signals
 from diagnosis.data_quality.output_comparison import OutputComparison
 from diagnosis.data_quality.recording_check import check_recordings
 from diagnosis.data_quality.unit_sign_clock_errors import agrees_with_other_outputs
-from language.overlays.expand_document import Project
+from diagnosis.model.placed_effect import shipped_effects
 from tests.diagnosis.recording_findings import check, finding_keys
 from tests.diagnosis.small_driveline import (
     Spoil,
@@ -194,8 +193,8 @@ def test_what_is_excited_says_which_effects_can_be_tested() -> None:
 
 
 def test_every_effect_that_is_shipped_says_what_it_needs() -> None:
-    assert set(Project(Path()).effect_index) <= set(EFFECT_NEEDS)
-    assert {need for needs in EFFECT_NEEDS.values() for need in needs} <= set(NEED_DESCRIPTIONS)
+    for effect in shipped_effects():
+        assert effect.needs and set(effect.needs) <= set(NEED_DESCRIPTIONS), effect.name
 
 
 @pytest.mark.parametrize(
