@@ -292,7 +292,7 @@ def _score_name(
         score += 0.5 if meaning.letters & wanted else -0.5
     places = meaning.places & own.places
     if places:
-        score += 1.5 * len(places)
+        score += 1.75 * len(places)
         reasons.append(f"its name says {' and '.join(sorted(places))}")
     elif meaning.places and own.places:
         score -= 1.5

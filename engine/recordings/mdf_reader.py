@@ -284,13 +284,13 @@ class _MdfFile:
         master = self.mdf.masters_db.get(place[0])
         kind = getattr(group.channels[master], "sync_type", 1) if master is not None else None
         if kind in TIME_MASTERS:
-            return [exact_fraction(time) for time in stamps]
+            return self._exact_stamps(stamps)
         time = self.mapping.time
         own = next((c for g, c in self.places.get(time, ()) if g == place[0]), None)
         if own is not None:
             cells = self.mdf.get(group=place[0], index=own).samples
             factor = self.mapping.time_unit.factor
-            return [exact_fraction(cell) * factor for cell in cells]
+            return [stamp * factor for stamp in self._exact_stamps(cells)]
         label = f"channel `{name}` has no time: its group has no master channel"
         if kind is not None:
             label = f"channel `{name}` has no time: the master channel of its group is "
@@ -300,6 +300,20 @@ class _MdfFile:
         help = "`time: {column: t, unit: s}` in the map names a channel of the group as its time"
         help += f"; the group has {listed}" if listed else ""
         raise SpecError([Problem("time", Span(self.source, 1, 1), label, help)])
+
+    def _exact_stamps(self, stamps: Any) -> list[Fraction]:
+        """Return time stamps as fractions, in their unit.
+
+        Raises SpecError for a stamp that is no finite number.
+        """
+        array = np.asarray(stamps)
+        is_number = array.ndim == 1 and array.dtype.kind in "biuf"
+        bad = np.flatnonzero(~np.isfinite(array)) if is_number else np.zeros(1, dtype=np.int64)
+        if not is_number or len(bad):
+            shown = f" `{array[bad[0]]}`" if is_number else ""
+            label = f"the time stamp{shown} is not a finite number"
+            raise SpecError([Problem("time", Span(self.source, int(bad[0]) + 1, 1), label)])
+        return [exact_fraction(time) for time in array]
 
 
 def _convert_texts(
