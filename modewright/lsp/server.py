@@ -35,10 +35,8 @@ from modewright.lsp.rename_check import RenameRefused
 TRIGGER_CHARACTERS = [" ", ".", "{", ",", "("]
 """Characters after which an editor requests completions."""
 REFUSALS = (
-    JsonRpcInvalidParams,
-    JsonRpcServerNotInitialized,
-    json.JSONDecodeError,
-    UnicodeDecodeError,
+    *(JsonRpcInvalidParams, JsonRpcServerNotInitialized),
+    *(json.JSONDecodeError, UnicodeDecodeError),
 )
 """Exceptions that the editor gets as an answer."""
 MALFORMED = "Unable to deserialize message"
