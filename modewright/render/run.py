@@ -222,10 +222,11 @@ def print_difference(console: Console, difference: RunDifference) -> None:
         console.print(text, highlight=False, soft_wrap=True)
     shift = difference.shift
     if shift.offset or shift.correlation is not None:
-        how = "as stated" if shift.correlation is None else f"correlation {shift.correlation:.4f}"
-        console.print(
-            f"the times of B are shifted by {shift.offset:.9g} s ({how})", highlight=False
+        how = (
+            "" if shift.correlation is None else f", with a correlation of {shift.correlation:.4g}"
         )
+        text = f"the times of B are shifted by {shift.offset:.9g} s{how}"
+        console.print(text, highlight=False)
     for sequence in difference.sequences:
         console.print(_sequence_line(sequence), highlight=False)
     for window in difference.windows[:MAX_EVENTS]:

@@ -233,3 +233,18 @@ def test_a_time_stamp_of_mf4_that_is_no_number_is_told(tmp_path: Path) -> None:
     mapping = write_map(tmp_path, "  u: {to: u, unit: 1}\n")
     with pytest.raises(SpecError, match=r"run.mf4:3:1: the time stamp `nan` is not a finite"):
         read_recording(tmp_path / "run.mf4", mapping, ["u"])
+
+
+@pytest.mark.parametrize("rows", [2**40, 2**62])
+def test_a_group_of_mf4_with_more_rows_than_its_file_is_refused(tmp_path: Path, rows: int) -> None:
+    file = asammdf.MDF(version="4.10")
+    file.append([asammdf.Signal(np.ones(4), 0.1 * np.arange(4), name="u", unit="")])
+    file.save(tmp_path / "run.mf4")
+    data = (tmp_path / "run.mf4").read_bytes()
+    group = data.index(b"##CG")
+    at = group + 24 + 8 * int.from_bytes(data[group + 16 : group + 24], "little") + 8
+    assert int.from_bytes(data[at : at + 8], "little") == 4
+    (tmp_path / "run.mf4").write_bytes(data[:at] + rows.to_bytes(8, "little") + data[at + 8 :])
+    mapping = write_map(tmp_path, "  u: {to: u, unit: 1}\n")
+    with pytest.raises(SpecError, match=f"its group states {rows} rows of 16 bytes"):
+        read_recording(tmp_path / "run.mf4", mapping, ["u"])
