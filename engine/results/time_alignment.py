@@ -56,7 +56,7 @@ def find_time_shift(a: Trajectory, b: Trajectory, patterns: Sequence[str] = ()) 
         raise DataError("no signal of both runs varies, so that no time shift can be found")
     longest = max(float(np.ptp(run.times)) for run in (a, b))
     periods = [float(np.median(np.diff(run.times))) for run in (a, b)]
-    period = max(min(p for p in periods if p > 0.0), longest / MAX_SAMPLES)
+    period = max(min((p for p in periods if p > 0.0), default=0.0), longest / MAX_SAMPLES)
     grids = [np.arange(run.times[0], run.times[-1] + period / 2, period) for run in (a, b)]
     lags, correlations = _correlate(a, b, names, grids)
     best = int(np.argmax(correlations))
@@ -115,15 +115,17 @@ def _refine(
 
     def cost(offset: float) -> float:
         shifted = shift_times(b, offset)
-        low, high = (f(a.times[k], shifted.times[k]) for f, k in ((max, 0), (min, -1)))
+        low = max(a.times[0], shifted.times[0])
+        high = min(a.times[-1], shifted.times[-1])
         times = a.times[(a.times >= low) & (a.times <= high)]
         if not len(times):
             return np.inf
-        return sum(
+        squares = (
             float(np.mean((resample_signal(a, n, times) - resample_signal(shifted, n, times)) ** 2))
             / scales[n] ** 2
             for n in names
         )
+        return float(sum(squares))
 
     bounds = (coarse - period, coarse + period)
     found = minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": 1e-3 * period})

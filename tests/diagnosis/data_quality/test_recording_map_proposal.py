@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from engine.recordings.recording import read_recording
 from language.loading.load import load_automaton
@@ -55,7 +56,7 @@ def propose(folder: Path, text: str, spec: str = SPEC, name: str = "run.csv") ->
     return mapping
 
 
-def table(**columns: list[float] | np.ndarray) -> str:
+def table(**columns: NDArray[np.float64]) -> str:
     """Return a text table with a time column `t_s` of 10 ms and these columns."""
     rows = zip(*columns.values(), strict=True)
     lines = [f"{0.01 * k:.2f},{','.join(map(str, row))}" for k, row in enumerate(rows)]

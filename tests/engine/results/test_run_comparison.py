@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from engine.results.comparison_plot import draw_difference
 from engine.results.run_comparison import compare_runs
@@ -196,7 +197,7 @@ def test_an_instance_among_others_is_not_renamed() -> None:
         compare_runs(a, both)
 
 
-def noise(times: np.ndarray) -> Trajectory:
+def noise(times: NDArray[np.float64]) -> Trajectory:
     """Return a run with a smooth and a held signal at times (n,) [s]."""
     smooth = np.sin(3 * times) + np.exp(-((times - 2.0) ** 2))
     held = np.floor(times / 0.25)
