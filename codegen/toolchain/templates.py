@@ -14,6 +14,7 @@ import jinja2
 from jinja2.bccache import Bucket
 
 from codegen.toolchain.build_cache import cache_subfolder, read_sealed, write_sealed
+from language.text.sanitise import escape_output
 
 CODEGEN = __name__.partition(".toolchain")[0]
 """The package of the C templates: `codegen`, which the wheel has below `modewright`."""
@@ -39,6 +40,11 @@ def render_html(packages: tuple[str, ...], template: str, context: Mapping[str, 
     return template_environment(packages, is_html=True).get_template(template).render(context)
 
 
+def _escape_value(value: Any) -> Any:
+    """Return a value of a page without invisible characters; HTML that a template makes is kept."""
+    return escape_output(value) if type(value) is str else value
+
+
 @cache
 def template_environment(packages: tuple[str, ...], is_html: bool) -> jinja2.Environment:
     """Return the Jinja environment of the templates of packages; one for each pair of arguments.
@@ -53,6 +59,7 @@ def template_environment(packages: tuple[str, ...], is_html: bool) -> jinja2.Env
         lstrip_blocks=True,
         keep_trailing_newline=True,
         autoescape=is_html,
+        finalize=_escape_value if is_html else None,
         bytecode_cache=_template_cache(),
     )
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from diagnosis.model.placed_effect import PlacedEffect
+from language.text.diagnostic import DataError
 from language.text.regular_file import read_regular_bytes
 
 DEFAULT_THRESHOLD = 20.0
@@ -59,13 +60,13 @@ def read_thresholds(path: Path) -> Thresholds:
     try:
         known = json.loads(read_regular_bytes(path).decode("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
-        raise ValueError(f"{path} cannot be read as thresholds: {error}") from None
+        raise DataError(f"{path} cannot be read as thresholds: {error}") from None
     if not isinstance(known, dict) or known.get("format") != FORMAT:
-        raise ValueError(f"{path} holds no thresholds: its format is not {FORMAT}")
+        raise DataError(f"{path} holds no thresholds: its format is not {FORMAT}")
     usual, groups = known.get("usual", DEFAULT_THRESHOLD), known.get("effects", {})
     values = [usual, *groups.values()] if isinstance(groups, dict) else [None]
     if not all(_is_positive(value) for value in values):
-        raise ValueError(f"{path}: `usual` and each of `effects` is a number of nats above 0")
+        raise DataError(f"{path}: `usual` and each of `effects` is a number of nats above 0")
     origin = str(known.get("origin", "")) or f"those of {path.name}"
     return Thresholds({str(k): float(v) for k, v in groups.items()}, float(usual), origin)
 

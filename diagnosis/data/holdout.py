@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from engine.recordings.recording_window import paths_overlap, strip_window_suffix
+from language.text.diagnostic import DataError
 
 
 def require_disjoint(train: Sequence[str | Path], held_out: Sequence[str | Path]) -> None:
@@ -24,7 +25,7 @@ def require_disjoint(train: Sequence[str | Path], held_out: Sequence[str | Path]
     for file in held_out:
         path = strip_window_suffix(Path(file))
         if not path.is_file() or not os.access(path, os.R_OK):
-            raise ValueError(f"{file} cannot be held out: there is no such file that can be read")
+            raise DataError(f"{file} cannot be held out: there is no such file that can be read")
         for learnt in train:
             _require_no_overlap(file, "is learnt from: it cannot be held out", learnt, opened=False)
 

@@ -18,6 +18,7 @@ from diagnosis.data_quality.clock_overlap import (
     lacking_overlap,
 )
 from diagnosis.data_quality.finding import Finding, Severity
+from diagnosis.data_quality.signal_words import read_unit_suffix
 from engine.recordings.channel_reader import file_unit
 from engine.recordings.recording import open_recording
 from engine.recordings.recording_file import RecordedFile, Samples
@@ -40,12 +41,6 @@ TIME_NAME = re.compile(
 )
 CHANNEL_TIME_NAME = re.compile(r"(t|time)_\w+_(s|ms|us)", re.IGNORECASE)
 """Names of time columns: of the whole file, and of single columns (these are not read)."""
-UNIT_SUFFIXES = {
-    "nm": "N*m", "rpm": "rpm", "radps": "rad/s", "rad_s": "rad/s", "kmh": "km/h", "m_s": "m/s",
-    "mm_s": "mm/s", "mps": "m/s", "kn": "kN", "n": "N", "mm": "mm", "m": "m", "rad": "rad",
-    "deg": "deg", "v": "V", "a": "A", "degc": "degC",
-}  # fmt: skip
-"""Units by the suffixes of column names."""
 INPUT_UNITS = ("N*m", "N")
 """Columns with these units are inputs, all others outputs."""
 EPOCH_UNITS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
@@ -74,14 +69,11 @@ def guess_map(
     paths = list(names)
     place = Span(Source(display_path(paths[0])), 1, 1)
     found = tuple(ScalarNode(name, Span(Source("command line"), 1, 1)) for name in databases)
-    second = parse_unit("s")
-    empty = RecordingMap("guessed from the names", "", second, {}, {}, place, databases=found)
+    empty = unmapped("guessed from the names", place, found)
     problems = Problems()
     files = [open_recording(path, empty, problems) for path in paths]
     problems.raise_if_errors()
-    time = "" if files[0].is_stamped else _find_time_column(files[0], problems)
-    problems.raise_if_errors()
-    unit, reason = _guess_time_unit(files[0].read(time), time) if time else (second, "")
+    time, unit, reason = guess_time(files[0])
     columns: dict[str, ColumnMapping] = {}
     for path, file in zip(paths, files, strict=True):
         span = Span(Source(display_path(path)), 1, 1)
@@ -101,6 +93,25 @@ def guess_map(
         text = f"the time `{time}` is taken in {unit.text}: {reason}"
         findings += [Finding("unit", name, time, text, "note") for name in names.values()]
     return mapping, tuple(findings)
+
+
+def unmapped(name: str, place: Span, databases: tuple[ScalarNode, ...] = ()) -> RecordingMap:
+    """Return a map without columns, with which a file is opened before its columns are known."""
+    return RecordingMap(name, "", parse_unit("s"), {}, {}, place, databases=databases)
+
+
+def guess_time(file: RecordedFile) -> tuple[str, Unit, str]:
+    """Return the column of time, its unit and the reason of the unit if it is not stated.
+
+    The column is empty for a file whose channels have their own time stamps. Raises SpecError if no
+    column looks like time.
+    """
+    if file.is_stamped:
+        return "", parse_unit("s"), ""
+    problems = Problems()
+    time = _find_time_column(file, problems)
+    problems.raise_if_errors()
+    return time, *_guess_time_unit(file.read(time), time)
 
 
 def _left_out_findings(file: RecordedFile, mapping: RecordingMap, name: str) -> list[Finding]:
@@ -271,7 +282,4 @@ def _guess_unit(name: str, written: str) -> Unit:
     known = file_unit(written) if written else None
     if known is not None:
         return known
-    for ending, text in sorted(UNIT_SUFFIXES.items(), key=lambda pair: -len(pair[0])):
-        if name.lower().endswith("_" + ending):
-            return parse_unit(text)
-    return NO_UNIT
+    return next((one.unit for one in read_unit_suffix(name) if one.unit), NO_UNIT)

@@ -16,7 +16,7 @@ from diagnosis.model.placed_effect import (
 from language.overlays.effect_reader import DESCRIPTION_KEYS, Effect, PlacePattern, read_effect
 from language.overlays.expand_document import Project
 from language.overlays.name_types import format_si_unit
-from language.text.diagnostic import Problems, Source, Span, SpecError
+from language.text.diagnostic import DataError, Problems, Source, Span, SpecError
 from language.text.document import Document, MappingNode
 from language.text.provenance import diff_specs
 
@@ -103,7 +103,7 @@ def load_effects(folder: Path) -> tuple[Effect, ...]:
     """
     effects = read_effects(folder)
     if not effects:
-        raise ValueError(f"there is no effect in {folder}")
+        raise DataError(f"there is no effect in {folder}")
     problems, first = Problems(), dict[str, Effect]()
     for effect in effects:
         previous = first.setdefault(effect.name, effect)

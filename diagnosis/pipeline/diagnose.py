@@ -52,7 +52,7 @@ from diagnosis.validation.oscillation import Oscillation, analyse_oscillation
 from engine.recordings.recording_window import paths_overlap, strip_window_suffix
 from language.loading.load import automaton_of
 from language.model.automaton import Automaton
-from language.text.diagnostic import SpecError
+from language.text.diagnostic import DataError, SpecError
 
 MAX_WORSE_RATIO = 1.1
 """Ratio of the simulation misfit after to before from which a signal is simulated worse."""
@@ -93,7 +93,7 @@ def diagnose(case: Case, log: LogCallback = lambda text: None) -> Diagnosis:
     automaton = automaton_of(case.document, case.project)
     seen = compared_outputs(case.mapping, automaton)
     if not seen:
-        raise ValueError(f"map `{case.mapping.name}` compares no output of `{automaton.name}`")
+        raise DataError(f"map `{case.mapping.name}` compares no output of `{automaton.name}`")
     series = share_period(
         [one for path in case.train for one in read_series(path, case, automaton, seen)]
     )

@@ -31,7 +31,7 @@ from diagnosis.validation.free_simulation import Misfit, compare_misfits
 from language.loading.load import automaton_of
 from language.model.automaton import Automaton
 from language.model.declaration import Parameter
-from language.text.diagnostic import Problems, Source, Span, suggest_name
+from language.text.diagnostic import DataError, Problems, Source, Span, suggest_name
 from language.text.document import Document, MappingNode
 from language.text.node_edit import put_node
 
@@ -123,7 +123,7 @@ def fit(
         automaton = automaton_of(document, case.project)
     seen = compared_outputs(case.mapping, automaton)
     if not seen:
-        raise ValueError(f"map `{case.mapping.name}` compares no output of `{automaton.name}`")
+        raise DataError(f"map `{case.mapping.name}` compares no output of `{automaton.name}`")
     case = dataclasses.replace(case, effects=())
     series = share_period(
         [one for path in case.train for one in read_series(path, case, automaton, seen)]

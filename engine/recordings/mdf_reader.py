@@ -50,6 +50,8 @@ MAGIC = (b"MDF     ", b"UnFinMF ")
 """First bytes of a finished and of an unfinished MDF file."""
 MIN_SIZE = 168
 """Size of the first two blocks of an MF4 file in bytes."""
+MAX_DEFLATE_RATIO = 1032
+"""Largest ratio of data to their compressed form (zlib, "Technical Details")."""
 MAX_WORDS = 6
 """Number of words of a conversion that a note lists."""
 
@@ -79,7 +81,7 @@ def read_mdf(path: Path, mapping: RecordingMap) -> RecordedFile:
     if len(data) < MIN_SIZE or not data.startswith(MAGIC):
         raise unreadable_error(source, "understood as MDF: it does not start like one")
     logging.getLogger("asammdf").setLevel(logging.CRITICAL)
-    file = _MdfFile(_open_mdf(asammdf, data, source), source, mapping)
+    file = _MdfFile(_open_mdf(asammdf, data, source), source, mapping, len(data))
     return file.with_bus(file.to_recorded_file())
 
 
@@ -103,11 +105,12 @@ def _open_mdf(asammdf: Any, data: bytes, source: Source) -> Any:
 
 @dataclass(frozen=True)
 class _MdfFile:
-    """Channels of an MDF file; `mdf` is its asammdf object."""
+    """Channels of an MDF file of `size` bytes; `mdf` is its asammdf object."""
 
     mdf: Any
     source: Source
     mapping: RecordingMap
+    size: int
 
     @cached_property
     def places(self) -> dict[str, list[Place]]:
@@ -207,6 +210,7 @@ class _MdfFile:
         frames: dict[FrameKey, list[CanFrame]] = {}
         count = 0
         for group, index in self.places[CAN_FRAMES]:
+            self._require_rows(CAN_FRAMES, group)
             try:
                 signal = self.mdf.get(group=group, index=index)
                 table, stamps = signal.samples, signal.timestamps.tolist()
@@ -232,6 +236,18 @@ class _MdfFile:
         }
         return CanLog(remove_repeated_frames(ordered, assumed), tuple(assumed))
 
+    def _require_rows(self, name: str, group: int) -> None:
+        """Raise SpecError if a group states more rows than the file can have.
+
+        The library would allocate and read them all.
+        """
+        stated = self.mdf.groups[group].channel_group
+        rows, width = int(stated.cycles_nr), int(stated.samples_byte_nr)
+        if rows * max(width, 1) > MAX_DEFLATE_RATIO * self.size:
+            label = f"channel `{name}`: its group states {rows} rows of {width} bytes, "
+            label += f"more than a file of {self.size} bytes can have"
+            raise unreadable_error(self.source, f"understood: {label}")
+
     def _samples(self, name: str) -> Samples:
         """Return the samples of a channel; arrays are NaN.
 
@@ -240,6 +256,7 @@ class _MdfFile:
         Raises SpecError if the channel cannot be read or its group has no time.
         """
         (place,) = self.places[name]
+        self._require_rows(name, place[0])
         try:
             signal = self.mdf.get(group=place[0], index=place[1], ignore_invalidation_bits=True)
             values = np.asarray(signal.samples)
@@ -284,13 +301,13 @@ class _MdfFile:
         master = self.mdf.masters_db.get(place[0])
         kind = getattr(group.channels[master], "sync_type", 1) if master is not None else None
         if kind in TIME_MASTERS:
-            return [exact_fraction(time) for time in stamps]
+            return self._exact_stamps(stamps)
         time = self.mapping.time
         own = next((c for g, c in self.places.get(time, ()) if g == place[0]), None)
         if own is not None:
             cells = self.mdf.get(group=place[0], index=own).samples
             factor = self.mapping.time_unit.factor
-            return [exact_fraction(cell) * factor for cell in cells]
+            return [stamp * factor for stamp in self._exact_stamps(cells)]
         label = f"channel `{name}` has no time: its group has no master channel"
         if kind is not None:
             label = f"channel `{name}` has no time: the master channel of its group is "
@@ -300,6 +317,20 @@ class _MdfFile:
         help = "`time: {column: t, unit: s}` in the map names a channel of the group as its time"
         help += f"; the group has {listed}" if listed else ""
         raise SpecError([Problem("time", Span(self.source, 1, 1), label, help)])
+
+    def _exact_stamps(self, stamps: Any) -> list[Fraction]:
+        """Return time stamps as fractions, in their unit.
+
+        Raises SpecError for a stamp that is no finite number.
+        """
+        array = np.asarray(stamps)
+        is_number = array.ndim == 1 and array.dtype.kind in "biuf"
+        bad = np.flatnonzero(~np.isfinite(array)) if is_number else np.zeros(1, dtype=np.int64)
+        if not is_number or len(bad):
+            shown = f" `{array[bad[0]]}`" if is_number else ""
+            label = f"the time stamp{shown} is not a finite number"
+            raise SpecError([Problem("time", Span(self.source, int(bad[0]) + 1, 1), label)])
+        return [exact_fraction(time) for time in array]
 
 
 def _convert_texts(

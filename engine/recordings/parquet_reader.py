@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from datetime import date
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
 from engine.recordings.recording_file import RecordedFile, Samples, require_size, unreadable_error
+from engine.recordings.text_dialect import MISSING_WORDS
 from engine.results.pyarrow_import import import_pyarrow
 from language.overlays.expand_document import display_path
 from language.text.diagnostic import Source, Span
@@ -15,8 +18,9 @@ from language.text.diagnostic import Source, Span
 def read_parquet(path: Path) -> RecordedFile:
     """Read a Parquet file; columns are read on demand.
 
-    Null cells are None, cells that are no numbers NaN. Raises SpecError if the file cannot be read
-    or understood, is empty or too large, and MissingToolError without pyarrow.
+    Null cells, NaN and words for missing values are None, other cells that are no numbers NaN.
+    Dates have the form of ISO 8601. Raises SpecError if the file cannot be read or understood, is
+    empty or too large, and MissingToolError without pyarrow.
     """
     source = Source(display_path(path))
     require_size(path, source)
@@ -31,15 +35,29 @@ def read_parquet(path: Path) -> RecordedFile:
         cells = table.column(name).to_pylist()
 
         def text(k: int) -> str:
-            return "" if cells[k] is None else repr(cells[k])
+            return _to_text(cells[k])
 
         return Samples([_to_float(cell) for cell in cells], text, lambda k: Span(source, k + 1, 1))
 
     return RecordedFile(source, "column", table.column_names, read, table.num_rows)
 
 
-def _to_float(cell: Any) -> float | None:
-    """Return a cell as float; None remains None, other types give NaN."""
+def _to_text(cell: Any) -> str:
+    """Return the text of a cell: empty for null, a date in ISO 8601, else that of a CSV file."""
     if cell is None:
+        return ""
+    if isinstance(cell, date):
+        return cell.isoformat()
+    return str(cell) if isinstance(cell, str | Decimal) else repr(cell)
+
+
+def _to_float(cell: Any) -> float | None:
+    """Return a cell as float; None for a missing value, also NaN; NaN for a cell of another type.
+
+    A text counts as missing if it is blank or a word for a missing value (`MISSING_WORDS`).
+    """
+    if isinstance(cell, str) and (not cell.strip() or cell.strip().casefold() in MISSING_WORDS):
         return None
-    return float(cell) if isinstance(cell, int | float) else math.nan
+    if cell is None or (isinstance(cell, float) and math.isnan(cell)):
+        return None
+    return float(cell) if isinstance(cell, int | float | Decimal) else math.nan

@@ -142,7 +142,9 @@ def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Re
     recording = Recording(path.name, channels, max(known), min(known), windows, place)
     assumed = tuple(
         Assumption(*map(escape_invisible, (item.subject, item.value, item.reason)))
-        for item in dict.fromkeys((*file.assumptions, *reader.assumptions))
+        for item in dict.fromkeys(
+            (*file.assumptions, *reader.time_reader.assumptions, *reader.assumptions)
+        )
     )
     recording = dataclasses.replace(recording, assumptions=assumed)
     return crop_to_windows(recording, mapping)

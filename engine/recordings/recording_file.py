@@ -36,6 +36,11 @@ class Assumption:
     value: str
     reason: str
 
+    @property
+    def text(self) -> str:
+        """The assumption as a line of a message."""
+        return f"assumed of the recording: {self.subject}: {self.value} ({self.reason})"
+
 
 @dataclass(frozen=True)
 class Samples:

@@ -24,6 +24,7 @@ from engine.results.trajectory import Trajectory
 from engine.simulation.simulate import simulate
 from language.ir.program import ObserverInfo, Program
 from language.model.system import Scenario, System
+from language.text.diagnostic import DataError
 
 NEGLIGIBLE_RATIO = 1e-9
 """Largest ratio to its matrix of an entry that the Program omits as 0 (rule 17f)."""
@@ -107,7 +108,7 @@ def reference_numbers(info: ObserverInfo) -> dict[str, float]:
                 if name in info.solved:
                     numbers[name] = value
                 elif letter != "G" and abs(value) > NEGLIGIBLE_RATIO * largest:
-                    raise ValueError(f"{name} is 0 in the Program, {value!r} by the libraries")
+                    raise DataError(f"{name} is 0 in the Program, {value!r} by the libraries")
     return numbers
 
 

@@ -8,11 +8,11 @@ import numpy as np
 
 from engine.results.mode_band import ModeBand
 from engine.results.plot import Panel, Picture, PlotLine, axis_title, draw_picture
+from engine.results.resampling import resample_signal
 from engine.results.run_comparison import (
     RunDifference,
     SignalDifference,
     rename_instance,
-    resample_signal,
 )
 from engine.results.trajectory import Trajectory
 

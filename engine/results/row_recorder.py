@@ -114,7 +114,9 @@ class RowRecorder:
         if any(column.block or column.source not in names for column in self.columns):
             return None
         places = [names.index(column.source) for column in self.columns]
-        return itemgetter(*places) if len(places) > 1 else lambda values: (values[places[0]],)
+        if len(places) > 1:
+            return itemgetter(*places)  # faster
+        return lambda values: tuple(values[place] for place in places)
 
     def extend(self, times: Sequence[Fraction], rows: Iterable[RowValues]) -> None:
         """Append complete rows, in the order of the columns, with their times [s]."""

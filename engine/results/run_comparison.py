@@ -9,9 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from engine.results.array_types import Reals
-from engine.results.sampled_run import SignalArray, matches_any
+from engine.results.resampling import hold_previous, resample_signal
+from engine.results.sampled_run import matches_any
+from engine.results.time_alignment import NO_SHIFT, TimeShift, find_time_shift, shift_times
 from engine.results.trajectory import Trajectory
 from language.ir.root_region import CHART
+from language.text.diagnostic import DataError
 
 MAX_NAMES = 5
 """Largest number of signals of a run that a message lists."""
@@ -66,7 +69,8 @@ class RunDifference:
 
     `only_a` and `only_b` are signals of one run; `uncovered` [s] is the time that only one run
     covers. `renamed_instance` is the name of the only instance of run B if its signals are compared
-    with those of an instance of another name, such as the base of a variant; else "".
+    with those of an instance of another name, such as the base of a variant; else "". `shift` is
+    the time that was added to the times of run B.
     """
 
     span: tuple[float, float]
@@ -78,6 +82,7 @@ class RunDifference:
     only_b: tuple[str, ...]
     uncovered: float
     renamed_instance: str = ""
+    shift: TimeShift = NO_SHIFT
 
     @property
     def is_within(self) -> bool:
@@ -110,19 +115,31 @@ def compare_runs(
     slack: float = 0.0,
     patterns: Sequence[str] = (),
     span: tuple[float, float] | None = None,
+    offset: float | None = 0.0,
 ) -> RunDifference:
     """Compare two runs at the samples of `a`; `b` is interpolated if it has other samples.
+
+    `offset` [s] is added to the times of `b` first; None finds it by correlation
+    (`find_time_shift`). Signals that one of the runs states as piecewise constant are held.
 
     Signals are compared by name. Two runs of one instance each may have different names of the
     instance (`rename_instance`), as the runs of an automaton and of its variant have.
     `patterns` (fnmatch) select signals, `span` [s] limits the time. A signal may differ by the
     larger of `relative` times its peak in `a` and its tolerances (patterns of names with values in
     SI); without both by nothing. Windows of different modes up to `slack` [s] are left out. Raises
-    ValueError for runs without common time or signal, for different units, for a tolerance that
-    matches no common signal, and for one that is negative or not finite.
+    DataError for runs without common time or signal, for different units, and for runs that do not
+    correlate; ValueError for a tolerance that matches no common signal, and for one that is
+    negative or not finite.
     """
     _require_tolerances({"relative": relative, "slack": slack, **(tolerances or {})})
+    if offset is not None and not np.isfinite(offset):
+        raise ValueError(f"the offset is {offset}: it is a finite time")
     original, b = b, rename_instance(b, a)
+    is_named_alike = b is original
+    held = a.piecewise_constant | b.piecewise_constant
+    a, b = replace(a, piecewise_constant=held), replace(b, piecewise_constant=held)
+    shift = find_time_shift(a, b, patterns) if offset is None else TimeShift(offset)
+    b = shift_times(b, shift.offset)
     names = [name for name in a.signals if matches_any(name, patterns)]
     common = [name for name in names if name in b.signals]
     times, uncovered = _common_times(a, b, span)
@@ -144,7 +161,8 @@ def compare_runs(
         only_a=tuple(name for name in names if name not in b.signals),
         only_b=tuple(n for n in b.signals if n not in a.signals and matches_any(n, patterns)),
         uncovered=uncovered,
-        renamed_instance="" if b is original else next(iter(_instances(original))),
+        renamed_instance="" if is_named_alike else next(iter(_instances(original))),
+        shift=shift,
     )
 
 
@@ -180,44 +198,22 @@ def _instances(run: Trajectory) -> set[str]:
     return {name.partition(".")[0] for name in run.signals if "." in name}
 
 
-def resample_signal(trajectory: Trajectory, name: str, times: Reals) -> Reals:
-    """Return a signal at times [s] (n,), as floats.
-
-    Reals are interpolated linearly; integers have the value of the last sample up to each time.
-    Before the first and after the last sample the nearest one holds. Samples at equal times are
-    returned as they are.
-    """
-    values = trajectory.signals[name]
-    if trajectory.times.tobytes() == times.tobytes():
-        return values.astype(np.float64)
-    if values.dtype == np.int64:
-        return _hold_previous(trajectory.times, values, times).astype(np.float64)
-    with np.errstate(invalid="ignore"):
-        resampled: Reals = np.interp(times, trajectory.times, values)
-    return resampled
-
-
-def _hold_previous(sample_times: Reals, values: SignalArray, times: Reals) -> SignalArray:
-    """Return the values of the last sample up to each time; the first value before it."""
-    return values[np.maximum(np.searchsorted(sample_times, times, side="right") - 1, 0)]
-
-
 def _common_times(
     a: Trajectory, b: Trajectory, span: tuple[float, float] | None
 ) -> tuple[Reals, float]:
     """Return the sample times [s] of `a` in the common span, and the time that is not common.
 
-    The second value [s] is the time that one run alone covers. Raises ValueError if a run has no
+    The second value [s] is the time that one run alone covers. Raises DataError if a run has no
     samples or the runs have no time in common.
     """
     if not len(a.times) or not len(b.times):
-        raise ValueError("a run without samples cannot be compared")
+        raise DataError("a run without samples cannot be compared")
     limits = span or (-np.inf, np.inf)
     starts = [max(float(run.times[0]), limits[0]) for run in (a, b)]
     ends = [min(float(run.times[-1]), limits[1]) for run in (a, b)]
     times = a.times[(a.times >= max(starts)) & (a.times <= min(ends))]
     if not len(times):
-        raise ValueError("the runs have no time in common")
+        raise DataError("the runs have no time in common")
     return times, max(starts) - min(starts) + max(ends) - min(ends)
 
 
@@ -231,17 +227,17 @@ def _require_tolerances(values: Mapping[str, float]) -> None:
 def _require_comparable(
     a: Trajectory, b: Trajectory, common: Sequence[str], tolerances: Mapping[str, float]
 ) -> None:
-    """Raise ValueError if two runs cannot be compared.
+    """Raise DataError for runs without common signal or with different units.
 
-    The reasons are no common signal, different units, and a tolerance that matches no signal.
+    Raises ValueError for a tolerance that matches no signal.
     """
     if not common:
         names = (", ".join(list(run.signals)[:MAX_NAMES]) or "none" for run in (a, b))
         text = "the runs have no signal in common: the signals of A are {}; those of B are {}"
-        raise ValueError(text.format(*names))
+        raise DataError(text.format(*names))
     for name in common:
         if a.units[name] != b.units[name]:
-            raise ValueError(f"`{name}` is in `{a.units[name]}` and in `{b.units[name]}`")
+            raise DataError(f"`{name}` is in `{a.units[name]}` and in `{b.units[name]}`")
     for pattern in tolerances:
         if not fnmatch.filter(common, pattern):
             raise ValueError(f"no common signal matches the tolerance of `{pattern}`")
@@ -306,7 +302,7 @@ def _mode_names(run: Trajectory, other: Trajectory, name: str, times: Reals) -> 
     numbers = (
         values
         if run.times.tobytes() == times.tobytes()
-        else _hold_previous(run.times, values, times)
+        else hold_previous(run.times, values, times)
     )
     return [names.get(int(number), str(number)) for number in numbers]
 

@@ -1,4 +1,4 @@
-"""Run file: stores a trajectory as CSV with a side file, or as Parquet, without loss.
+"""Run file: stores a trajectory as CSV with a side file, or as Parquet, without loss, or as MF4.
 
 A CSV has only the samples, so other tools can read it. `run.csv.json` beside `run.csv` has mode
 names, events and the reason for which the run stopped. Parquet has both in one file. NaN payloads
@@ -28,7 +28,9 @@ from language.text.diagnostic import Problem, Source, Span, SpecError
 from language.text.regular_file import open_regular_file
 
 FORMATS = (".csv", ".parquet")
-"""Suffixes of run files."""
+"""Suffixes of run files that are read."""
+WRITTEN_FORMATS = (*FORMATS, ".mf4")
+"""Suffixes of run files that are written."""
 FORMAT_VERSION = 1
 """Version of the side data; files of another version are refused."""
 MODE_NUMBER = re.compile(r"-?[0-9]{1,9}")
@@ -42,13 +44,18 @@ SideData = dict[str, Any]
 def encode_run(trajectory: Trajectory, path: Path) -> dict[Path, bytes]:
     """Return the files of a trajectory as bytes by path; nothing is written.
 
-    For `.csv` they are the CSV and its side file (`side_path`), for `.parquet` one file. Raises
-    ValueError for another suffix (the case is ignored), and MissingToolError without pyarrow.
+    For `.csv` they are the CSV and its side file (`side_path`), for `.parquet` and `.mf4` one file.
+    An MF4 has no events and is not read back as a run (`encode_mdf`). Raises ValueError for another
+    suffix (the case is ignored), and MissingToolError without pyarrow or asammdf.
     """
+    if path.suffix.lower() == ".mf4":
+        from engine.results.mdf_run import encode_mdf
+
+        return {path: encode_mdf(trajectory)}
     if path.suffix.lower() == ".parquet":
         return {path: _encode_parquet(trajectory)}
     if path.suffix.lower() != ".csv":
-        raise ValueError(f"{path}: a run is written to {' or '.join(FORMATS)}")
+        raise ValueError(f"{path}: a run is written to {', '.join(WRITTEN_FORMATS)}")
     side = json.dumps(_side_data(trajectory), indent=1, allow_nan=False) + "\n"
     return {path: trajectory.csv().encode(), side_path(path): side.encode()}
 

@@ -26,7 +26,7 @@ from language.ir.root_region import CHART
 from language.loading.recording_map_columns import pair_columns
 from language.model.automaton import Automaton
 from language.model.system import RecordingMap
-from language.text.diagnostic import Problems, SpecError
+from language.text.diagnostic import DataError, Problems, SpecError
 
 MAX_TICKS = 20_000_000
 """Largest number of ticks of a replay."""
@@ -91,11 +91,11 @@ def replay(
     up to the end of the recording. An input keeps its value until the next stamp; inputs without a
     column have the constant of the map, else their default. The trajectory has inputs as
     `in.<name>`, outputs, and the mode of each region. `build` creates the stepper; `on_tick` is
-    called after each tick. Raises ValueError for a continuous Program, and SpecError if the number
+    called after each tick. Raises DataError for a continuous Program, and SpecError if the number
     of ticks is not in 1 to `MAX_TICKS`.
     """
     if program.period is None:
-        raise ValueError(f"{program.name} is continuous: only a sampled automaton is replayed")
+        raise DataError(f"{program.name} is continuous: only a sampled automaton is replayed")
     stepper = build(program)
     feeds = [c for c in recording.channels.values() if c.column.to is not None]
     start = max(channel.times[0] for channel in feeds) if feeds else Fraction(0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from bisect import bisect_right
 from collections.abc import Callable
 from fractions import Fraction
@@ -11,7 +12,7 @@ from engine.recordings.recording import Channel, Recording, read_recording
 from language.loading.stimulus_reader import constant_pieces, linear_pieces
 from language.lowering.connection_program import piece_block
 from language.model.system import Scenario, Stimulus, StimulusPiece
-from language.text.diagnostic import Problem, SpecError
+from language.text.diagnostic import AssumptionWarning, Problem, SpecError
 
 EvaluateFormula = Callable[[str, float], float]
 """Function that returns the value of a formula piece, by its block and the time [s]."""
@@ -69,7 +70,8 @@ def resolve_recording(scenario: Scenario) -> Scenario:
     Without a recording the scenario itself is returned. Time 0 is the first time at which every
     input from the recording has a value. Initial values that name a column have its latest value at
     that time, else its first one. A missing horizon is the end of the recording. Raises SpecError
-    for mistakes in the file, and if it ends before time 0.
+    for mistakes in the file, and if it ends before time 0. Warns (AssumptionWarning) of each
+    assumption about the file.
     """
     use = scenario.recording
     if use is None:
@@ -77,6 +79,8 @@ def resolve_recording(scenario: Scenario) -> Scenario:
     columns = {s.column for s in scenario.inputs.values() if s.column}
     columns |= {value for value in scenario.initial.values() if isinstance(value, str)}
     recording = read_recording(use.path, use.mapping, sorted(columns))
+    for item in recording.assumptions:
+        warnings.warn(item.text, AssumptionWarning, stacklevel=2)
     fed = [recording.channels[s.column] for s in scenario.inputs.values() if s.column]
     start = max((channel.times[0] for channel in fed), default=Fraction(0))
     if recording.end <= start:

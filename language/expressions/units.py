@@ -223,6 +223,12 @@ def are_compatible(a: Dimension, b: Dimension) -> bool:
     return a.powers == b.powers and (a.angle is None or b.angle is None or a.angle == b.angle)
 
 
+def is_same_unit(first: Unit, second: Unit) -> bool:
+    """Return whether two units have the same dimension, factor and offset."""
+    same = (first.factor, first.offset) == (second.factor, second.offset)
+    return same and are_compatible(first.dimension, second.dimension)
+
+
 def common_dimension(a: Dimension, b: Dimension) -> Dimension:
     """Return the dimension of a sum of two compatible quantities; compatibility is not checked.
 

@@ -188,6 +188,13 @@ def render_all(problems: Iterable[Problem]) -> str:
     return "\n\n".join(render_problem(problem) for problem in sort_problems(problems))
 
 
+class DataError(ValueError):
+    """The content of a file or a run prevents what was requested; the request itself is right.
+
+    A ValueError that is no DataError states a wrong argument.
+    """
+
+
 class MissingToolError(Exception):
     """An error for a missing program or package; the message says how to install it."""
 
@@ -198,3 +205,7 @@ class BrokenToolError(MissingToolError):
 
 class LargeRunWarning(UserWarning):
     """A run records so many rows that it takes long and may need more memory than there is."""
+
+
+class AssumptionWarning(UserWarning):
+    """A reader of a recording assumed what neither the file nor the map states."""

@@ -19,15 +19,24 @@ from diagnosis.data_quality.recording_check import (
     check_recordings as run_checks,
     used_columns,
 )
-from diagnosis.data_quality.recording_map_inference import guess_map
+from diagnosis.data_quality.recording_map_inference import guess_map, guess_time, unmapped
+from diagnosis.data_quality.recording_map_proposal import propose_columns
+from diagnosis.data_quality.recording_map_text import format_map, map_name
 from diagnosis.pipeline.diagnosis_case import Case
-from engine.recordings.recording import Recording, read_recording
-from language.loading.load import load_automaton
+from engine.recordings.recording import Recording, open_recording, read_recording
+from engine.recordings.recording_window import strip_window_suffix
+from language.expressions.name_rules import NAME_PATTERN
+from language.loading.load import automaton_of, load_automaton
 from language.loading.recording_map_columns import check_pairing, type_columns
 from language.loading.recording_map_reader import read_map
 from language.model.automaton import Automaton
 from language.model.system import RecordingMap
-from language.overlays.expand_document import expand_document, read_document
+from language.overlays.expand_document import (
+    Project,
+    display_path,
+    expand_document,
+    read_document,
+)
 from language.text.arguments import (
     PathText,
     PathTexts,
@@ -37,7 +46,9 @@ from language.text.arguments import (
     to_text,
     to_texts,
 )
-from language.text.diagnostic import MissingToolError, Problems, SpecError
+from language.text.diagnostic import MissingToolError, Problems, Source, Span, SpecError
+from language.text.document import ScalarNode
+from language.text.sanitise import escape_invisible
 from modewright.runtime.back_end_choice import simulate_resolved
 
 if TYPE_CHECKING:
@@ -124,6 +135,64 @@ def check_recordings(
         run_checks(recordings, mapping, automaton, simulate_resolved, mistakes), reasons
     )
     return CheckedRecordings(check, mapping, recordings, automaton)
+
+
+def propose_map(
+    file: PathText,
+    spec: PathText,
+    databases: PathTexts = (),
+    name: PathText | None = None,
+    root: PathText | None = None,
+) -> str:
+    """Return the YAML text of a map from the columns of a file to the signals of an automaton.
+
+    The columns, units and scales follow from names, units, values and the model
+    (`propose_columns`); comments tell the reasons and what is open. `databases` are the DBC files
+    of a CAN log; the map names them as they are given here. Raises SpecError for a file or a spec
+    that cannot be read, for a file without a time column and for one of whose columns none fits;
+    MissingToolError; and ValueError for a name that no map can have.
+    """
+    project, path = to_project(root), Path(to_text(file, "file"))
+    automaton, own_map = _without_map(to_text(spec, "spec"), project)
+    named = to_texts(databases, "databases")
+    title = optional(to_text, name, "name") or own_map
+    if title and not NAME_PATTERN.fullmatch(title):
+        raise ValueError(f"`{title}` is not a name of a map")
+    place = Span(Source(display_path(path)), 1, 1)
+    nodes = tuple(ScalarNode(one, Span(Source("command line"), 1, 1)) for one in named)
+    problems = Problems()
+    recorded = open_recording(path, unmapped("proposed", place, nodes), problems)
+    problems.raise_if_errors()
+    time, unit, _ = guess_time(recorded)
+    proposal = propose_columns(recorded, automaton, time)
+    if not proposal.columns:
+        label = f"no column fits an input or output of `{automaton.name}`"
+        names = ", ".join((*automaton.inputs, *automaton.outputs))
+        help = recorded.explain_missing("") or f"its signals are {names}"
+        problems.error("empty", recorded.header_span, label, help)
+    problems.raise_if_errors()
+    stem = Path(strip_window_suffix(path).name.removesuffix(".gz")).stem
+    about = f"proposed for {automaton.name} from the columns of {path.name}; check each line"
+    title = title or map_name(stem)
+    return format_map(title, escape_invisible(about), (time, unit), proposal, named)
+
+
+def _without_map(spec: str, project: Project) -> tuple[Automaton, str]:
+    """Return an automaton without its recording map, and the name of a map that does not exist.
+
+    The name is empty if the spec names no map or an existing one. Raises SpecError.
+    """
+    document = expand_document(project.read(project.path_of(spec)), project)
+    entries = dict(document.root.entries)
+    entry = entries.pop("recording_map", None)
+    root = dataclasses.replace(document.root, entries=entries)
+    automaton = automaton_of(dataclasses.replace(document, root=root), project)
+    name = document.root.text_of("recording_map") if entry else ""
+    try:
+        project.path_of(name) if name else None
+    except SpecError:
+        return automaton, name
+    return automaton, ""
 
 
 def held_out_findings(case: Case, automaton: Automaton) -> tuple[str, ...]:

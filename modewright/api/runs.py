@@ -23,6 +23,7 @@ from language.text.arguments import (
     to_text,
     to_time_window,
 )
+from language.text.diagnostic import DataError
 from modewright.api import simulation as api
 from modewright.runtime.output_files import write_files
 
@@ -34,10 +35,10 @@ Run = Trajectory | PathText
 
 
 def save(trajectory: Trajectory, path: PathText) -> None:
-    """Write a run to `.csv` (with events and names in `.csv.json` beside it) or to `.parquet`.
+    """Write a run to `.csv` (with events and names in `.csv.json` beside it), `.parquet` or `.mf4`.
 
-    Both files are replaced atomically. Raises OutputError, MissingToolError without pyarrow, and
-    ValueError for other suffixes.
+    Both files are replaced atomically. Raises OutputError, MissingToolError without pyarrow or
+    asammdf, and ValueError for other suffixes.
     """
     require_instance(trajectory, Trajectory, "trajectory")
     write_files(encode_run(trajectory, to_path(path, "path")))
@@ -61,6 +62,9 @@ def _trajectory_of(run: Run, name: str, root: PathText | None = None) -> Traject
     if Path(text).suffix.lower() in FORMATS:
         return read_run(Path(text))
     side_of = Path(text.removesuffix(".json"))
+    if Path(text).suffix.lower() == ".mf4":
+        label = f"`{text}` is for other tools and for `replay`: an MF4 has no transitions"
+        raise ValueError(f"{label}; compare runs in .csv or .parquet")
     if text.endswith(".json") and side_of.suffix.lower() == ".csv":
         raise ValueError(f"`{text}` is the side file of a run: name the run, {side_of}")
     system, colon, scenario = text.rpartition(":")
@@ -97,7 +101,7 @@ def plot(
     for each, name in zip(runs, names, strict=True):
         if not len(each.times) or not each.signals:
             what = "signals" if len(each.times) else "samples"
-            raise ValueError(f"`{name}` has no {what}: there is nothing to draw")
+            raise DataError(f"`{name}` has no {what}: there is nothing to draw")
     shown = title or (f"A: {names[0]}; B (dashed): {names[1]}" if len(runs) > 1 else names[0])
     return draw_overview(runs, patterns, window, shown)
 
@@ -111,16 +115,21 @@ def compare(
     slack: float = 0.0,
     signals: PathTexts | None = None,
     span: TimeWindow | None = None,
+    offset: float = 0.0,
+    align: bool = False,
 ) -> RunDifference:
     """Compare two runs signal by signal at the samples of `a`, to which `b` is interpolated.
+
+    `offset` [s] is added to the times of `b`. With `align` the offset with the largest correlation
+    of the runs is found instead; `shift` of the result states it.
 
     `is_within` of the result states whether all are within tolerance. A signal may differ by the
     larger of `relative` times its peak in `a` and its entry in `tolerances` (patterns of names,
     values in SI); by nothing without both. Modes may disagree for `slack` [s]. `signals` is a
     pattern of the names to compare or a list of patterns (None: all), `span` is the time window
-    [s]. Raises as `read`, and ValueError for runs without common time or signal, for different
-    units, for a tolerance that matches no signal, is negative or is not finite, and for an empty
-    list.
+    [s]. Raises as `read`; DataError, a ValueError, for runs without common time or signal, for
+    different units and for runs that do not correlate; and ValueError for a tolerance that matches
+    no signal, is negative or is not finite, for `align` with an offset, and for an empty list.
     """
     allowed = {
         pattern: to_number(value, f"tolerances[{pattern!r}]")
@@ -129,9 +138,13 @@ def compare(
     patterns = optional(to_some_texts, signals, "signals") or ()
     window = optional(to_time_window, span, "span")
     relative, slack = to_number(relative, "relative"), to_number(slack, "slack")
+    offset = to_number(offset, "offset")
+    if align and offset:
+        raise ValueError("`align` finds the offset: leave out one of them")
     return compare_runs(
         _trajectory_of(a, "a"), _trajectory_of(b, "b"),
         relative=relative, tolerances=allowed, slack=slack, patterns=patterns, span=window,
+        offset=None if align else offset,
     )  # fmt: skip
 
 

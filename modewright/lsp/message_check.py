@@ -18,6 +18,7 @@ from pygls.exceptions import (
     JsonRpcInvalidParams,
     JsonRpcInvalidRequest,
     JsonRpcParseError,
+    JsonRpcServerNotInitialized,
 )
 from pygls.protocol import (
     JsonRPCNotification,
@@ -28,6 +29,10 @@ from pygls.protocol import (
 
 from modewright.lsp.message_reader import HeaderError
 
+INITIALIZE = "initialize"
+"""The first request of an editor."""
+BEFORE_INITIALIZE = (INITIALIZE, "exit")
+"""Messages that are handled before it."""
 MAX_CAUSES = 3
 """Largest number of causes in the message of an error."""
 EXACT_TYPES = (str, int, bool)
@@ -62,6 +67,9 @@ def _require_type(value: Any, kind: type) -> Any:
 class CheckedProtocol(LanguageServerProtocol):
     """The protocol of the language server with an answer to each malformed request."""
 
+    is_initialized = False
+    """Whether the editor sent a valid request `initialize`."""
+
     @property
     def is_shut_down(self) -> bool:
         """Whether the editor sent the request `shutdown`."""
@@ -77,12 +85,17 @@ class CheckedProtocol(LanguageServerProtocol):
     def handle_message(self, message: Any) -> None:
         """Answer a message; a malformed one gets the error JsonRpcInvalidRequest (-32600),
         JsonRpcMethodNotFound (-32601) or JsonRpcInvalidParams (-32602).
+
+        Before `initialize` a request gets JsonRpcServerNotInitialized (-32002), and a notification
+        other than `exit` is ignored.
         """
         try:
             structured_message = self._structure_message(message)
         except JsonRpcException as error:
             self.refuse_message(message, error)
             return
+        if isinstance(message, dict) and message.get("method") == INITIALIZE:
+            self.is_initialized = True
         super().handle_message(structured_message)
 
     def refuse_message(self, message: Any, error: JsonRpcException) -> None:
@@ -107,8 +120,12 @@ class CheckedProtocol(LanguageServerProtocol):
             raise JsonRpcInvalidRequest("`method` is missing or no string")
         if is_request and not _is_request_id(message["id"]):
             raise JsonRpcInvalidRequest("`id` is neither a number nor a string")
+        if not self.is_initialized and method not in BEFORE_INITIALIZE:
+            raise JsonRpcServerNotInitialized("the first request is `initialize`")
         if is_request:
             self._get_handler(method)  # raises JsonRpcMethodNotFound
+            if self.is_initialized and method == INITIALIZE:
+                raise JsonRpcInvalidRequest("the server is initialized already")
             if self.is_shut_down:
                 raise JsonRpcInvalidRequest("the server accepts no requests after `shutdown`")
         kind = self.get_message_type(method)

@@ -11,7 +11,11 @@ from importlib.metadata import version
 from typing import BinaryIO
 
 from lsprotocol import types
-from pygls.exceptions import JsonRpcException, JsonRpcInvalidParams
+from pygls.exceptions import (
+    JsonRpcException,
+    JsonRpcInvalidParams,
+    JsonRpcServerNotInitialized,
+)
 from pygls.io_ import StdoutWriter
 from pygls.lsp.server import LanguageServer
 
@@ -30,7 +34,10 @@ from modewright.lsp.rename_check import RenameRefused
 
 TRIGGER_CHARACTERS = [" ", ".", "{", ",", "("]
 """Characters after which an editor requests completions."""
-REFUSALS = (JsonRpcInvalidParams, json.JSONDecodeError, UnicodeDecodeError)
+REFUSALS = (
+    *(JsonRpcInvalidParams, JsonRpcServerNotInitialized),
+    *(json.JSONDecodeError, UnicodeDecodeError),
+)
 """Exceptions that the editor gets as an answer."""
 MALFORMED = "Unable to deserialize message"
 """Start of the log of pygls about a malformed response, which is ignored."""

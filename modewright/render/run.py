@@ -194,8 +194,7 @@ def print_replay(console: Console, replayed: Replayed) -> None:
         text = f"{found.output} against the recording: RMS {found.rms:.4g} {found.unit}"
         console.print(f"{text}, largest {found.largest:.4g} {found.unit}", highlight=False)
     for item in replayed.recording.assumptions:
-        text = f"assumed of the recording: {item.subject}: {item.value} ({item.reason})"
-        console.print(escape(text), highlight=False, soft_wrap=True)
+        console.print(escape(item.text), highlight=False, soft_wrap=True)
     for name in replayed.left_out:
         console.print(f"`{name}` of the map is not read: there is no such input", highlight=False)
     if replayed.verdict:
@@ -206,8 +205,8 @@ def print_difference(console: Console, difference: RunDifference) -> None:
     """Print the differences of two runs and whether they are within tolerance.
 
     Signals are a table with RMS, largest difference and the first time beyond tolerance; then
-    follow transition sequences, windows of different modes (at most MAX_EVENTS), signals of one run
-    only, and the first difference.
+    follow the time shift, transition sequences, windows of different modes (at most MAX_EVENTS),
+    signals of one run only, and the first difference.
     """
     table = Table(
         "signal", "unit", "RMS", "largest", escape("at [s]"), escape("beyond from [s]"),
@@ -221,6 +220,13 @@ def print_difference(console: Console, difference: RunDifference) -> None:
     if difference.renamed_instance:
         text = f"signals of `{difference.renamed_instance}` in B are compared by the names of A"
         console.print(text, highlight=False, soft_wrap=True)
+    shift = difference.shift
+    if shift.offset or shift.correlation is not None:
+        how = (
+            "" if shift.correlation is None else f", with a correlation of {shift.correlation:.4g}"
+        )
+        text = f"the times of B are shifted by {shift.offset:.9g} s{how}"
+        console.print(text, highlight=False)
     for sequence in difference.sequences:
         console.print(_sequence_line(sequence), highlight=False)
     for window in difference.windows[:MAX_EVENTS]:
@@ -258,6 +264,8 @@ def difference_json(difference: RunDifference) -> dict[str, Any]:
         "only_a": list(difference.only_a),
         "only_b": list(difference.only_b),
         "uncovered": difference.uncovered,
+        "offset": difference.shift.offset,
+        "correlation": difference.shift.correlation,
         "first": list(difference.first) if difference.first else None,
     }
 

@@ -35,6 +35,10 @@ def compare(
     slack: Annotated[
         float, typer.Option(min=0.0, help="time for which modes may differ [s]")
     ] = 0.0,
+    offset: Annotated[float, typer.Option(help="time that is added to the times of B [s]")] = 0.0,
+    align: Annotated[
+        bool, typer.Option("--align", help="find that time by correlation of the runs")
+    ] = False,
     signals: Signals = None,
     start: From = None,
     end: To = None,
@@ -48,6 +52,7 @@ def compare(
 
     \b
     modewright compare run.csv ev_driveline:tip_out
+    modewright compare run.csv other.csv --align --relative 0.01
     modewright compare a.csv b.parquet --relative 1e-6 --tolerance '*.T_hs=0.5' --plot diff.png
     """
     from modewright.api import runs
@@ -59,13 +64,16 @@ def compare(
         first, second = runs.read(a), runs.read(b)
         found = runs.compare(
             first, second, relative=relative, tolerances=_parse_tolerances(tolerance),
-            slack=slack, signals=signals or None, span=span_of(start, end),
+            slack=slack, signals=signals or None, span=span_of(start, end), offset=offset,
+            align=align,
         )  # fmt: skip
     if plot:
         from engine.results.comparison_plot import draw_difference
+        from engine.results.time_alignment import shift_times
 
         names = (runs.run_label(a, "A"), runs.run_label(b, "B"))
-        write_files({plot: draw_difference(first, second, found, names).data(form)})
+        shifted = shift_times(second, found.shift.offset)
+        write_files({plot: draw_difference(first, shifted, found, names).data(form)})
     if as_json:
         show.print_json(show.difference_json(found))
     else:

@@ -1,4 +1,4 @@
-"""Command recording: check the quality of recordings."""
+"""Command recording: check the quality of recordings, and propose maps of their columns."""
 
 from __future__ import annotations
 
@@ -11,16 +11,19 @@ from modewright.cli.common.console import console, progress_spinner, report_writ
 from modewright.cli.common.exit_codes import EXIT_CODES, PROBLEMS
 from modewright.cli.common.options import Json, Plot, picture_format, usage_errors
 from modewright.render.pluralisation import pluralise
-from modewright.runtime.output_files import require_writable, write_files
+from modewright.runtime.output_files import OutputError, require_writable, write_files
 
 recording = typer.Typer(
-    no_args_is_help=True, rich_markup_mode=None, help="Check recordings.", epilog=EXIT_CODES
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="Check recordings, propose maps.",
+    epilog=EXIT_CODES,
 )
 
 
 @recording.callback()
 def _recording() -> None:
-    """Check recordings."""
+    """Check recordings, propose maps."""
 
 
 @recording.command(epilog=EXIT_CODES)
@@ -65,3 +68,42 @@ def check(
         report_written_files([plot] if plot else [])
     if not checked.check.is_usable:
         raise typer.Exit(PROBLEMS)
+
+
+@recording.command("map", epilog=EXIT_CODES)
+def propose(
+    file: Annotated[Path, typer.Argument(help="the recording: a file of any known format")],
+    spec: Annotated[str, typer.Option("--spec", "-s", help="an automaton: name or file")],
+    databases: Annotated[
+        list[str] | None, typer.Option("--dbc", help="CAN database of a log (repeatable)")
+    ] = None,
+    name: Annotated[
+        str | None, typer.Option("--name", help="name of the map; by default from the file")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="write the map: a new file .yaml")
+    ] = None,
+) -> None:
+    """Propose a map: the columns of a recording for the signals of an automaton.
+
+    The map follows from names, units, values and the model. Its comments tell the reasons and what
+    is open. A person checks and corrects it. Without --out it is printed.
+
+    \b
+    modewright recording map drive.csv --spec leaf_motor_side --out spec/map_drive.yaml
+    """
+    from modewright.api.recordings import propose_map
+
+    if out:
+        if out.suffix != ".yaml":
+            raise OutputError(f"{out}: a map ends with .yaml")
+        if out.exists():
+            raise OutputError(f"{out}: the file exists; a map may have corrections of a person")
+        require_writable(out)
+    with progress_spinner(f"looking at {file.name}"), usage_errors():
+        text = propose_map(file, spec, databases or (), name)
+    if out:
+        write_files({out: text.encode()})
+        report_written_files([out])
+    else:
+        print(text, end="")

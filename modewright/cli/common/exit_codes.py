@@ -16,6 +16,8 @@ from typing import Any
 import typer
 
 from language.text.diagnostic import (
+    AssumptionWarning,
+    DataError,
     LargeRunWarning,
     MissingToolError,
     SpecError,
@@ -42,10 +44,10 @@ def run_with_exit_code(run: Callable[[], object]) -> int:
     """Run a command line and return its exit code; messages of exceptions go to stderr.
 
     The code is the int that `run` returns, else DONE. A usage error gives USAGE, Ctrl-C
-    INTERRUPTED, typer.Exit its own code. SpecError, OutputError, ClusterError and an OSError of
-    USER_ERRNOS give PROBLEMS, MissingToolError gives TOOL. A closed pipe on stdout gives DONE. Any
-    other Exception gives DEFECT and writes a report file. Meanwhile stdout and stderr escape
-    invisible characters, and warnings of modewright are printed as one line each.
+    INTERRUPTED, typer.Exit its own code. SpecError, OutputError, ClusterError, DataError and an
+    OSError of USER_ERRNOS give PROBLEMS, MissingToolError gives TOOL. A closed pipe on stdout gives
+    DONE. Any other Exception gives DEFECT and writes a report file. Meanwhile stdout and stderr
+    escape invisible characters, and warnings of modewright are printed as one line each.
     """
     with escape_standard_streams(), warnings.catch_warnings():
         warnings.showwarning = partial(_show_warning, warnings.showwarning)
@@ -58,6 +60,8 @@ def _show_warning(
     """Print a warning of modewright to stderr; pass others to `show_other`."""
     if issubclass(category, LargeRunWarning):
         print(f"warning: {message}", file=sys.stderr)
+    elif issubclass(category, AssumptionWarning):
+        print(message, file=sys.stderr)
     else:
         show_other(message, category, *place)
 
@@ -81,7 +85,7 @@ def _run(run: Callable[[], object]) -> int:
     except SpecError as error:
         report_problems(error)
         return PROBLEMS
-    except (OutputError, ClusterError) as error:
+    except (OutputError, ClusterError, DataError) as error:
         print(f"error: {error}", file=sys.stderr)
         return PROBLEMS
     except MissingToolError as error:

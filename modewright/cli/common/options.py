@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from language.text.diagnostic import DataError
 from modewright.cli.common.exit_codes import PROBLEMS
 from modewright.runtime.output_files import OutputError, require_calibration_output
 
@@ -29,7 +30,9 @@ Calibrations = Annotated[
 ]
 Out = Annotated[
     Path | None,
-    typer.Option("--out", "-o", help="write the run: .csv (with a side file) or .parquet"),
+    typer.Option(
+        "--out", "--output", "-o", help="write the run: .csv (with a side file), .parquet or .mf4"
+    ),
 ]
 Plot = Annotated[
     Path | None, typer.Option("--plot", "-p", help="write a figure: .png, .svg or .pdf")
@@ -76,9 +79,14 @@ def span_of(start: float | None, end: float | None) -> tuple[float, float] | Non
 
 @contextmanager
 def usage_errors() -> Iterator[None]:
-    """Convert a ValueError in the context to a usage error (exit code 2)."""
+    """Convert a ValueError in the context to a usage error (exit code 2).
+
+    A DataError passes: the exit code is 1.
+    """
     try:
         yield
+    except DataError:
+        raise
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
 
@@ -105,12 +113,14 @@ def calibration_name(out: Path | None, name: str | None, date: str) -> str:
 
 
 def require_run_format(path: Path | None) -> None:
-    """Raise OutputError for a run file that ends neither in .csv nor in .parquet, in any case.
+    """Raise OutputError for a run file that ends with none of the known suffixes, in any case.
 
     None is accepted.
     """
-    if path and path.suffix.lower() not in (".csv", ".parquet"):
-        raise OutputError(f"{path}: a run ends with .csv or .parquet")
+    from engine.results.run_file import WRITTEN_FORMATS
+
+    if path and path.suffix.lower() not in WRITTEN_FORMATS:
+        raise OutputError(f"{path}: a run ends with .csv, .parquet or .mf4")
 
 
 def picture_format(path: Path) -> str:

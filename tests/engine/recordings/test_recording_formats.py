@@ -127,7 +127,7 @@ class TestParquet:
         write_parquet(path, t_s=[0.01, 0.02, 0.02], T_em=[1.0, math.nan, 2.0])
         lines = told(path, self.TIME + COLUMNS, "T_em").splitlines()
         assert [line.split("drive.parquet:")[1] for line in lines if "error" in line] == [
-            "2:1: error: `nan` in column `T_em` is not a finite number",
+            "2:1: error: column `T_em` has no value here: `nan`",
             "3:1: error: the time stamp 0.02 is not above the one before, 0.02",
         ]
 

@@ -4,13 +4,29 @@ from __future__ import annotations
 
 import gzip
 import math
+from dataclasses import replace
+from datetime import datetime
+from decimal import Decimal
+from pathlib import Path
 
+import asammdf
+import numpy as np
+import pyarrow
+import pyarrow.parquet
 import pytest
 from hypothesis import given, strategies as st
 
 from engine.recordings.recording import read_recording
+from language.loading.recording_map_columns import add_signal_types
 from language.text.diagnostic import SpecError
-from tests.engine.recording_files import GOOD, HEAD, RenderProblems, render_problems, write_map
+from tests.engine.recording_files import (
+    GOOD,
+    HEAD,
+    RenderProblems,
+    only_channel,
+    render_problems,
+    write_map,
+)
 
 
 class TestAValue:
@@ -183,3 +199,52 @@ class TestAFileThatIsNotWhatItSeems:
 
     def test_a_map_with_sign_0(self, told: RenderProblems) -> None:
         assert "sign" in told("t_s,a\n1,5\n", "  a: {to: a, unit: A, sign: 0}\n")
+
+
+@pytest.mark.parametrize(
+    "missing", [None, float("nan"), "NaN", "", " - ", "#N/A"], ids=["null", "nan", *"abcd"]
+)
+def test_a_missing_value_of_parquet_is_left_out(tmp_path: Path, missing: object) -> None:
+    values = ["ON", missing, "OFF"] if isinstance(missing, str) else [1.0, missing, 0.0]
+    path = tmp_path / "run.parquet"
+    pyarrow.parquet.write_table(pyarrow.table({"t": [0.0, 0.1, 0.2], "u": values}), path)
+    mapping = write_map(tmp_path, "  u: {to: u, unit: 1, blank: skip}\n")
+    mapping = add_signal_types(replace(mapping, time="t"), {"u": "truth"}, {})
+    channel = only_channel(read_recording(path, mapping, ["u"]))
+    assert (channel.seconds.tolist(), channel.values) == ([0.0, 0.2], (1.0, 0.0))
+
+
+def test_dates_and_decimals_of_parquet_are_read(tmp_path: Path) -> None:
+    stamps = [datetime(2026, 1, 31, 10, 30, k, 500_000) for k in range(2)]
+    path = tmp_path / "run.parquet"
+    table = pyarrow.table({"t": stamps, "u": [Decimal("1.25"), Decimal("2.50")]})
+    pyarrow.parquet.write_table(table, path)
+    mapping = replace(write_map(tmp_path, "  u: {to: u, unit: 1}\n"), time="t")
+    channel = only_channel(read_recording(path, mapping, ["u"]))
+    assert channel.values == (1.25, 2.5)
+    assert channel.times[1] - channel.times[0] == 1
+
+
+def test_a_time_stamp_of_mf4_that_is_no_number_is_told(tmp_path: Path) -> None:
+    stamps = np.array([0.0, 0.1, np.nan, 0.3])
+    file = asammdf.MDF(version="4.10")
+    file.append([asammdf.Signal(np.ones(4), stamps, name="u", unit="")])
+    file.save(tmp_path / "run.mf4")
+    mapping = write_map(tmp_path, "  u: {to: u, unit: 1}\n")
+    with pytest.raises(SpecError, match=r"run.mf4:3:1: the time stamp `nan` is not a finite"):
+        read_recording(tmp_path / "run.mf4", mapping, ["u"])
+
+
+@pytest.mark.parametrize("rows", [2**40, 2**62])
+def test_a_group_of_mf4_with_more_rows_than_its_file_is_refused(tmp_path: Path, rows: int) -> None:
+    file = asammdf.MDF(version="4.10")
+    file.append([asammdf.Signal(np.ones(4), 0.1 * np.arange(4), name="u", unit="")])
+    file.save(tmp_path / "run.mf4")
+    data = (tmp_path / "run.mf4").read_bytes()
+    group = data.index(b"##CG")
+    at = group + 24 + 8 * int.from_bytes(data[group + 16 : group + 24], "little") + 8
+    assert int.from_bytes(data[at : at + 8], "little") == 4
+    (tmp_path / "run.mf4").write_bytes(data[:at] + rows.to_bytes(8, "little") + data[at + 8 :])
+    mapping = write_map(tmp_path, "  u: {to: u, unit: 1}\n")
+    with pytest.raises(SpecError, match=f"its group states {rows} rows of 16 bytes"):
+        read_recording(tmp_path / "run.mf4", mapping, ["u"])

@@ -7,11 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from engine.results.comparison_plot import draw_difference
 from engine.results.run_comparison import compare_runs
 from engine.results.sampled_run import Event
+from engine.results.time_alignment import TimeShift, shift_times
 from engine.results.trajectory import Trajectory
+from language.text.diagnostic import DataError
 
 
 def run(values: list[float], modes: list[int] | None = None, step: float = 1.0) -> Trajectory:
@@ -192,3 +195,68 @@ def test_an_instance_among_others_is_not_renamed() -> None:
     )
     with pytest.raises(ValueError, match="no signal in common"):
         compare_runs(a, both)
+
+
+def noise(times: NDArray[np.float64]) -> Trajectory:
+    """Return a run with a smooth and a held signal at times (n,) [s]."""
+    smooth = np.sin(3 * times) + np.exp(-((times - 2.0) ** 2))
+    held = np.floor(times / 0.25)
+    return Trajectory(
+        "r",
+        times,
+        {"p.x": smooth, "p.h": held},
+        {"p.x": "m", "p.h": "1"},
+        {},
+        (Event(1.0, 1, "p", "t", "a", "b"),),
+        piecewise_constant=frozenset({"p.h"}),
+    )
+
+
+def test_a_held_signal_is_held_between_samples() -> None:
+    fine, coarse = np.arange(0.0, 4.0, 0.01), np.arange(0.0, 4.0, 0.25)
+    found = compare_runs(noise(coarse), noise(fine), patterns=["p.h"], span=(0.0, 3.75))
+    assert found.is_within
+    found = compare_runs(noise(fine), noise(coarse), patterns=["p.h"], span=(0.0, 3.7))
+    assert found.signals[0].largest == 0.0
+
+
+@pytest.mark.parametrize("shift", [0.35, -0.2, 0.0137, 0.0])
+@pytest.mark.parametrize("period", [0.01, 0.013])
+def test_the_time_shift_of_a_run_is_found(shift: float, period: float) -> None:
+    a, b = noise(np.arange(0.0, 5.0, 0.01)), noise(np.arange(0.0, 5.0, period))
+    moved = shift_times(b, -shift)
+    found = compare_runs(a, moved, offset=None, patterns=["p.x"], relative=1e-3)
+    assert found.shift.offset == pytest.approx(shift, abs=2e-4)
+    assert found.shift.correlation == pytest.approx(1.0, abs=1e-3)
+    assert all(signal.first is None for signal in found.signals)
+
+
+def test_a_stated_offset_moves_samples_and_events() -> None:
+    a = noise(np.arange(0.0, 5.0, 0.01))
+    assert shift_times(a, 0.5).events[0].time == 1.5
+    found = compare_runs(a, shift_times(a, -0.5), offset=0.5, relative=1e-12)
+    assert found.is_within and found.shift == TimeShift(0.5)
+
+
+@pytest.mark.parametrize(
+    ("other", "reason"),
+    [
+        (replace(noise(np.arange(0.0, 5.0, 0.01)), signals={"p.x": np.ones(500)}), "varies"),
+        (
+            replace(
+                noise(np.arange(0.0, 5.0, 0.01)),
+                signals={"p.x": np.random.default_rng(1).normal(size=500)},
+            ),
+            "do not correlate",
+        ),
+    ],
+)
+def test_runs_that_do_not_correlate_are_refused(other: Trajectory, reason: str) -> None:
+    with pytest.raises(DataError, match=reason):
+        compare_runs(noise(np.arange(0.0, 5.0, 0.01)), other, offset=None, patterns=["p.x"])
+
+
+@pytest.mark.parametrize("offset", [math.nan, math.inf])
+def test_an_offset_is_a_finite_time(offset: float) -> None:
+    with pytest.raises(ValueError, match="finite time"):
+        compare_runs(run([1.0, 1.0]), run([1.0, 1.0]), offset=offset)

@@ -125,3 +125,30 @@ def test_words_of_a_dbc_are_names_of_an_enumeration(
     assert run("replay", "selector", "drive.log", "--map", "bench", "--json") == 0
     events = json.loads(capsys.readouterr().out)["events"]
     assert [event["target"] for event in events] == ["high"]
+
+
+SCENARIO = """\
+language: 1
+scenario: driven
+of: selector
+horizon: recording
+recording: {file: drive.log, map: bench}
+"""
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("simulate", "selector", "-s", "driven"),
+        ("lockstep", "selector", "-s", "driven"),
+        ("compare", "selector:driven", "selector:driven"),
+    ],
+)
+def test_every_run_on_a_recording_tells_the_notes(
+    project: Path, command: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    (project / "spec" / "driven.yaml").write_text(SCENARIO, "utf-8")
+    assert run(*command) == 0
+    text = " ".join(capsys.readouterr().err.split())
+    assert f"({SHORT})" in text and f"({CUT})" in text
+    assert "assumed of the recording: frames of message `Motor`" in text

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
+import math
 from importlib import metadata
 from pathlib import Path
 
 import pytest
 
+from diagnosis.criterion.threshold import read_thresholds
+from language.text.diagnostic import DataError
 from modewright.api import doctor
 from modewright.cli.app import app
 from modewright.cli.common.exit_codes import run_with_exit_code
@@ -69,8 +73,8 @@ def test_an_option_that_would_have_no_effect_is_wrong_usage(
     ("text", "options", "code", "told"),
     [
         (ROWS, ("--from", "5"), 2, "no sample lies in 5 s to inf s: they cover 0 s to 0.1 s"),
-        (ROWS[: ROWS.index("\n") + 1], (), 2, "`run.csv` has no samples"),
-        ("t [s]\n0.0\n0.1\n", (), 2, "`run.csv` has no signals"),
+        (ROWS[: ROWS.index("\n") + 1], (), 1, "`run.csv` has no samples"),
+        ("t [s]\n0.0\n0.1\n", (), 1, "`run.csv` has no signals"),
         (f"{ROWS}0.05,1.0\n", (), 1, "run.csv:4:1: "),
     ],
 )
@@ -108,3 +112,46 @@ def test_a_dependency_of_several_extras_is_checked_once(monkeypatch: pytest.Monk
     lines = ["pyarrow>=1; extra == 'a'", "numpy", "pyarrow>=1; extra == 'b'"]
     monkeypatch.setattr(metadata, "requires", lambda name: lines)
     assert [check.name for check in doctor._check_dependencies()] == ["pyarrow", "numpy"]
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("t [s],p.T [N*m]\n", "a run without samples"),
+        ("t [s],p.T [N*m]\n7.0,1.0\n", "no time in common"),
+        ("t [s],p.w [rad/s]\n0.0,1.0\n", "no signal in common"),
+        ("t [s],p.T [N]\n0.0,1.0\n", "is in `N*m` and in `N`"),
+    ],
+)
+def test_what_the_data_of_two_runs_prevent_has_code_1(
+    text: str, reason: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("other.csv").write_text(text)
+    assert run("compare", "run.csv", "other.csv") == 1
+    assert reason in capsys.readouterr().err
+    assert run("compare", "run.csv", "run.csv", "--align") == 0
+
+
+def test_a_file_without_thresholds_has_code_1(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("limits.json").write_text("{}")
+    with pytest.raises(DataError, match="holds no thresholds"):
+        read_thresholds(Path("limits.json"))
+
+
+def test_the_time_shift_of_two_runs_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    rows = [(0.01 * k, math.exp(-((k - 50.0) ** 2) / 50.0)) for k in range(200)]
+    for name, offset in (("a.csv", 0.0), ("b.csv", 0.3)):
+        lines = [f"{time + offset!r},{value!r}" for time, value in rows]
+        Path(name).write_text("\n".join(["t [s],p.T [N*m]", *lines]) + "\n")
+    assert run("compare", "a.csv", "b.csv", "--align", "--relative", "1e-6") == 0
+    assert "the times of B are shifted by -0.3 s, with a correlation of 1" in (
+        capsys.readouterr().out
+    )
+    assert run("compare", "a.csv", "b.csv", "--align", "--relative", "1e-6", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["offset"] == pytest.approx(-0.3) and found["correlation"] > 0.999
+    assert run("compare", "a.csv", "b.csv", "--offset=-0.3", "--relative", "1e-6") == 0
+    assert "the times of B are shifted by -0.3 s\n" in capsys.readouterr().out
+    assert run("compare", "a.csv", "b.csv", "--offset", "1", "--align") == 2
+    assert run("compare", "a.csv", "b.mf4") == 2
+    assert "an MF4 has no transitions" in " ".join(capsys.readouterr().err.split())

@@ -128,3 +128,11 @@ def test_colours_of_a_terminal_stay() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, env=environment
     )
     assert re.fullmatch(r"\x1b\[31m\\x1btext\x1b\[0m\n", done.stdout), done
+
+
+def test_the_page_of_a_difference_has_no_control_characters(project: Path) -> None:
+    odd = project / "a\x1b[31m\u202eb.yaml"
+    odd.write_text(SPEC.replace("NAME", "three"))
+    assert run("diff", str(odd), "one", "--html", "diff.html") == 0
+    text = (project / "diff.html").read_text("utf-8")
+    assert controls_in(text) == set() and r"\x1b[31m\u202eb" in text

@@ -21,7 +21,10 @@ class LspClient:
     """One running server; a context that shuts it down."""
 
     def __init__(
-        self, encodings: tuple[str, ...] = ("utf-16",), stderr: IO[bytes] | None = None
+        self,
+        encodings: tuple[str, ...] = ("utf-16",),
+        stderr: IO[bytes] | None = None,
+        first: Message | None = None,
     ) -> None:
         self.process = subprocess.Popen(
             [sys.executable, "-m", "modewright", "lsp"],
@@ -35,6 +38,7 @@ class LspClient:
         self.number = 0
         self.versions: dict[str, int] = {}
         self.told: dict[str, tuple[int | None, list[Message]]] = {}
+        self.first_answer = self.request_raw(**first) if first else {}
         general = {"positionEncodings": list(encodings)}
         capabilities = {"general": general}
         start = {"processId": None, "rootUri": None, "capabilities": capabilities}

@@ -251,3 +251,15 @@ def is_running(number: int) -> bool:
     except ProcessLookupError:
         return False
     return True
+
+
+@pytest.mark.parametrize("method", ["textDocument/hover", "shutdown", "nothing"])
+def test_a_request_before_initialize_is_not_initialized(method: str) -> None:
+    params = VALID if method == "textDocument/hover" else None
+    with LspClient(first={"method": method, "params": params}) as talk:
+        assert talk.first_answer["error"]["code"] == -32002
+        assert talk.request("textDocument/hover", VALID) is None
+        again = talk.request_raw(
+            "initialize", {"processId": None, "rootUri": None, "capabilities": {}}
+        )
+        assert again["error"]["code"] == -32600
