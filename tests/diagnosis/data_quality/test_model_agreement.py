@@ -44,9 +44,10 @@ def test_a_leap_of_years_is_no_work() -> None:
 def test_signals_are_compared_in_the_time_of_the_recording(period: float, late: int) -> None:
     """A process that is sampled each minute has the lags of a minute."""
     rng = np.random.default_rng(5)
-    moves = np.asarray(np.convolve(rng.normal(size=2200), np.hanning(100), "same"), np.float64)
+    moves = np.convolve(rng.normal(size=2200), np.hanning(100), "same")
     times = period * np.arange(2000)
-    compared = OutputComparison(times, 2.0 * moves[100 - late : 2100 - late], moves[100:2100])
+    measured = np.asarray(2.0 * moves[100 - late : 2100 - late], dtype=np.float64)
+    compared = OutputComparison(times, measured, np.asarray(moves[100:2100], dtype=np.float64))
     found = compare_signals("run.csv", "T", compared)
     assert found is not None and found.is_clear
     assert found.gain == pytest.approx(2.0, rel=0.1)
