@@ -45,7 +45,7 @@ def test_signals_are_compared_in_the_time_of_the_recording(period: float, late: 
     """A process that is sampled each minute has the lags of a minute."""
     rng = np.random.default_rng(5)
     moves = np.convolve(rng.normal(size=2200), np.hanning(100), "same")
-    times = period * np.arange(2000)
+    times = np.asarray(period * np.arange(2000), dtype=np.float64)
     measured = np.asarray(2.0 * moves[100 - late : 2100 - late], dtype=np.float64)
     compared = OutputComparison(times, measured, np.asarray(moves[100:2100], dtype=np.float64))
     found = compare_signals("run.csv", "T", compared)
