@@ -204,7 +204,7 @@ def _common_times(
     """Return the sample times [s] of `a` in the common span, and the time that is not common.
 
     The second value [s] is the time that one run alone covers. Raises DataError if a run has no
-    samples or the runs have no time in common.
+    samples or the runs have no time in common, and ValueError if they have none in the span.
     """
     if not len(a.times) or not len(b.times):
         raise DataError("a run without samples cannot be compared")
@@ -213,6 +213,11 @@ def _common_times(
     ends = [min(float(run.times[-1]), limits[1]) for run in (a, b)]
     times = a.times[(a.times >= max(starts)) & (a.times <= min(ends))]
     if not len(times):
+        has_common_time = max(run.times[0] for run in (a, b)) <= min(
+            run.times[-1] for run in (a, b)
+        )
+        if span and has_common_time:
+            raise ValueError(f"the runs have no sample from {span[0]:g} s to {span[1]:g} s")
         raise DataError("the runs have no time in common")
     return times, max(starts) - min(starts) + max(ends) - min(ends)
 

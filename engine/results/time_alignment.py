@@ -85,7 +85,7 @@ def _correlate(
     from scipy.signal import correlate
 
     n_a, n_b = map(len, grids)
-    lags = np.arange(-(n_b - 1), n_a)
+    lags = np.arange(-(n_b - 1), n_a, dtype=np.float64)
     total = np.zeros(len(lags))
     for name in names:
         x, y = (resample_signal(run, name, grid) for run, grid in zip((a, b), grids, strict=True))

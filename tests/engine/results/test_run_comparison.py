@@ -260,3 +260,9 @@ def test_runs_that_do_not_correlate_are_refused(other: Trajectory, reason: str) 
 def test_an_offset_is_a_finite_time(offset: float) -> None:
     with pytest.raises(ValueError, match="finite time"):
         compare_runs(run([1.0, 1.0]), run([1.0, 1.0]), offset=offset)
+
+
+def test_a_window_outside_of_both_runs_is_a_wrong_argument() -> None:
+    with pytest.raises(ValueError, match="no sample from 99 s to inf s") as caught:
+        compare_runs(run([1.0, 1.0]), run([1.0, 1.0]), span=(99.0, math.inf))
+    assert not isinstance(caught.value, DataError)
