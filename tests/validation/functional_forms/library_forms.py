@@ -40,14 +40,14 @@ def delay(u: Array, step: float, late: float) -> Array:
     return np.asarray(np.interp(time - late, time, u))
 
 
-def rate_limit(u: Array, step: float, r_max: float, tau_f: float) -> Array:
+def rate_limit(u: Array, step: float, r_max: float, tau_f: float, fall: float = 1.0) -> Array:
     """torque_rate_limit: midpoint rule."""
     found, last = [float(u[0])], float(u[0])
     given = u.tolist()
     for now, then in pairwise(given):
-        rate = max(-r_max, min(r_max, (now - last) / tau_f))
+        rate = max(-fall * r_max, min(r_max, (now - last) / tau_f))
         half = last + 0.5 * step * rate
-        rate = max(-r_max, min(r_max, (0.5 * (now + then) - half) / tau_f))
+        rate = max(-fall * r_max, min(r_max, (0.5 * (now + then) - half) / tau_f))
         last += step * rate
         found.append(last)
     return np.array(found)
@@ -65,9 +65,18 @@ def drift(u: Array, step: float, drop: float, tau_d: float, load: float, warm_0:
     return np.asarray(u * (1 - drop * warm))
 
 
-def ripple(u: Array, angle: Array, a: float, order: float, phase: float) -> Array:
+def ripple(
+    u: Array,
+    angle: Array,
+    a: float,
+    order: float,
+    phase: float,
+    s_2: float = 0.0,
+    c_2: float = 0.0,
+) -> Array:
     """torque_ripple."""
-    return np.asarray(u + a * np.sin(order * angle + phase))
+    turn = order * angle + phase
+    return np.asarray(u + a * (np.sin(turn) + s_2 * np.sin(2 * turn) + c_2 * np.cos(2 * turn)))
 
 
 def dry(w: Array, t_c: float, rise: float, w_k: float, w_s: float) -> Array:
@@ -165,8 +174,10 @@ def tyre_slip(torque: Array, c_t: float) -> Array:
     return np.asarray(torque / c_t)
 
 
-def eccentric(y: Array, angle: Array, ecc: float, phase: float, tau: float) -> Array:
+def eccentric(
+    y: Array, angle: Array, ecc: float, phase: float, tau: float, order: float = 1.0
+) -> Array:
     """sensor_eccentricity: `y` and its angle are behind a filter, the tone is before it."""
-    ahead, x = angle + phase + tau * y, tau * y
+    ahead, x = order * (angle + tau * y) + phase, order * tau * y
     tone = (np.sin(ahead) - x * np.cos(ahead)) / (1 + x**2)
     return np.asarray(y * (1 + ecc * tone))

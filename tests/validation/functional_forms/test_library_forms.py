@@ -34,15 +34,15 @@ WRITTEN_OUT: dict[str, str] = {
     "position_dependent_stiffness": "a ord ph s_2 c_2 s_3 c_3",
     "second_gap": "J_m k_2 c_2 x_c a_2",
     "sensor_delay": "T_d",
-    "sensor_eccentricity": "ecc ph tau_e",
+    "sensor_eccentricity": "ecc ord ph tau_e",
     "sensor_lag": "tau part",
     "stiffness_hysteresis": "k_r F_r",
     "stiffness_nonlinear": "q x_r",
     "stribeck_friction": "T_c rise w_k bend",
     "torque_derating": "P_max share w_lo",
     "torque_drift": "drop tau_d load warm_0 u_n",
-    "torque_rate_limit": "r_max tau_f",
-    "torque_ripple": "a ord ph",
+    "torque_rate_limit": "r_max fall tau_f",
+    "torque_ripple": "a ord s_2 c_2 ph",
     "tyre_slip": "J_w C_t l_r w_lo",
     "unequal_half_shafts": "side alpha",
 }
@@ -92,8 +92,8 @@ TORQUES: list[tuple[str, str, Callable[[], Array]]] = [
         lambda: library.delay(COURSE, MS, 0.035),
     ),
     (
-        "torque_rate_limit@T: {values: {r_max: 250, tau_f: 9 ms}}", "u_r_T",
-        lambda: library.rate_limit(COURSE, MS, 250.0, 0.009),
+        "torque_rate_limit@T: {values: {r_max: 250, fall: 0.6, tau_f: 9 ms}}", "u_r_T",
+        lambda: library.rate_limit(COURSE, MS, 250.0, 0.009, 0.6),
     ),
     (
         "torque_drift@T: {values: {drop: 0.3, tau_d: 1 s, load: 0.6, warm_0: 0.2, u_n: 100 N*m}}",
@@ -101,8 +101,9 @@ TORQUES: list[tuple[str, str, Callable[[], Array]]] = [
         lambda: library.drift(COURSE, MS, 0.3, 1.0, 0.6, 0.2),
     ),
     (
-        "torque_ripple@T: {values: {a: 5 N*m, ord: 3, ph: 0.4 rad}}", "T_rip_T",
-        lambda: library.ripple(COURSE, 10 * TIME, 5.0, 3.0, 0.4),
+        "torque_ripple@T: {values: {a: 5 N*m, ord: 3, ph: 0.4 rad, s_2: 0.3, c_2: -0.2}}",
+        "T_rip_T",
+        lambda: library.ripple(COURSE, 10 * TIME, 5.0, 3.0, 0.4, 0.3, -0.2),
     ),
     (
         "compliance@body: {values: {part: 0.25, k_c: 600, c_c: 5}}", "w",
@@ -117,9 +118,9 @@ TORQUES: list[tuple[str, str, Callable[[], Array]]] = [
         lambda: library.delay(integral(COURSE) / J, MS, 0.035),
     ),
     (
-        "sensor_eccentricity@w: {values: {ecc: 0.05, ph: 0.4 rad, tau_e: 20 ms}}", "w",
+        "sensor_eccentricity@w: {values: {ecc: 0.05, ord: 2, ph: 0.4 rad, tau_e: 20 ms}}", "w",
         lambda: library.eccentric(
-            integral(COURSE) / J, integral(integral(COURSE)) / J, 0.05, 0.4, 0.02
+            integral(COURSE) / J, integral(integral(COURSE)) / J, 0.05, 0.4, 0.02, 2.0
         ),
     ),
 ]  # fmt: skip
