@@ -124,9 +124,9 @@ def test_no_physics_is_blamed_for_a_wrong_unit(
     [
         (["--budget", "soon"], 2, "is not a time"),
         (["--fail-on", "doubt"], 2, "one of effect"),
-        (["--effects", "spec/none"], 2, "there is no effect in"),
+        (["--effects", "spec/none"], 1, "there is no effect in"),
         (["--held-out", "./run_0.csv"], 2, "cannot be held out"),
-        (["--held-out", "run_9.csv"], 2, "run_9.csv cannot be held out: there is no such file"),
+        (["--held-out", "run_9.csv"], 1, "run_9.csv cannot be held out: there is no such file"),
         (["--train", "./run_1.csv"], 2, "is named twice"),
     ],
 )
