@@ -30,7 +30,7 @@ from language.expressions.units import (
     are_compatible,
     parse_unit,
 )
-from language.model.system import ColumnMapping, RecordingMap
+from language.model.system import CanDatabase, ColumnMapping, RecordingMap
 from language.overlays.expand_document import display_path
 from language.text.diagnostic import Problems, Source, Span, SpecError
 from language.text.document import ScalarNode
@@ -65,7 +65,8 @@ def guess_map(
 ) -> tuple[RecordingMap, tuple[Finding, ...]]:
     """Return a map of the first `MAX_COLUMNS` (12) numeric columns, and findings on the others.
 
-    `names` are the display names of files, `databases` the CAN databases of the command line. The
+    `names` are the display names of files, `databases` the CAN databases of the command line
+    (`car.dbc`, or `can0=car.dbc` for those of one bus). The
     time is a column of the first file with such a name, else one that increases. Units are those of
     the file, else of the suffix; columns in `INPUT_UNITS` are inputs. Raises SpecError without a
     time or a numeric column and for a file that cannot be opened; MissingToolError for a missing
@@ -73,7 +74,7 @@ def guess_map(
     """
     paths = list(names)
     place = Span(Source(display_path(paths[0])), 1, 1)
-    found = tuple(ScalarNode(name, Span(Source("command line"), 1, 1)) for name in databases)
+    found = tuple(map(_read_database_option, databases))
     second = parse_unit("s")
     empty = RecordingMap("guessed from the names", "", second, {}, {}, place, databases=found)
     problems = Problems()
@@ -101,6 +102,15 @@ def guess_map(
         text = f"the time `{time}` is taken in {unit.text}: {reason}"
         findings += [Finding("unit", name, time, text, "note") for name in names.values()]
     return mapping, tuple(findings)
+
+
+def _read_database_option(text: str) -> CanDatabase:
+    """Return the database of an option `FILE`, or `BUS=FILE`."""
+    bus, separator, name = text.partition("=")
+    span = Span(Source("command line"), 1, 1)
+    if separator and not Path(text).exists():
+        return CanDatabase(ScalarNode(name, span), bus)
+    return CanDatabase(ScalarNode(text, span))
 
 
 def _left_out_findings(file: RecordedFile, mapping: RecordingMap, name: str) -> list[Finding]:
