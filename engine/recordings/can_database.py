@@ -14,7 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from engine.recordings.dbc_text import find_statements, explain_left_out, read_dbc_text
+from engine.recordings.dbc_text import explain_left_out, find_statements, read_dbc_text
 from engine.recordings.recording_file import (
     LFS_HELP,
     Assumption,
@@ -299,6 +299,7 @@ def _load_messages(
     if path.suffix.lower() != ".dbc":
         return cantools.database.load_file(path, strict=False).messages, [], []
     text = read_dbc_text(data, name)
+    messages: list[Any] = []
     for k in range(MAX_ROUNDS + 1):
         try:
             written = "\n".join(text.lines) + "\n"

@@ -26,11 +26,12 @@ NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 STATEMENT = re.compile(
     rf"""^[ \t]*(?:
     BO_[ \t]+(?P<id>\d+)[ \t]+(?P<message>\w+)[ \t]*:[ \t]*(?P<size>\d+)
-    |SG_[ \t]+(?P<signal>\w+)(?:[ \t]+(?P<mux>M|m\d+M?))?[ \t]*:[ \t]*(?P<start>\d+)[ \t]*\|
+    |SG_[ \t]+(?P<signal>\w+)(?:[ \t]+(?P<mux>M|m\d*M?))?[ \t]*:[ \t]*(?P<start>\d+)[ \t]*\|
     [ \t]*(?P<length>\d+)[ \t]*@[ \t]*(?P<order>[01])[ \t]*(?P<sign>[-+])[ \t]*
     \([ \t]*(?P<factor>{NUMBER})[ \t]*,[ \t]*(?P<offset>{NUMBER})[ \t]*\)[ \t]*
     \[[^\]]*\][ \t]*(?P<unit>{STRING})
-    |SIG_VALTYPE_[ \t]+(?P<float_id>\d+)[ \t]+(?P<float_signal>\w+)[ \t]*:?[ \t]*(?P<float_type>[012])
+    |SIG_VALTYPE_[ \t]+(?P<float_id>\d+)[ \t]+(?P<float_signal>\w+)
+    [ \t]*:?[ \t]*(?P<float_type>[012])
     |SG_MUL_VAL_[ \t]+(?P<range_id>\d+)[ \t]+(?P<range_signal>\w+)[ \t]+(?P<parent>\w+)[ \t]+
     (?P<ranges>\d+-\d+(?:[ \t,]+\d+-\d+)*)
     |BA_[ \t]+"System(?:Message|Signal)LongSymbol"[ \t]+(?:BO_[ \t]+(?P<long_id>\d+)
@@ -152,42 +153,43 @@ def read_dbc(path: Path) -> list[OracleMessage]:
 def parse_dbc(text: str) -> list[OracleMessage]:
     """Return the messages of the text of a DBC file."""
     messages: list[OracleMessage] = []
-    long_names: list[tuple[str, str, str]] = []
-    text = COMMENT.sub("", text)
-    for match in STATEMENT.finditer(text):
+    descriptions = []
+    for match in STATEMENT.finditer(COMMENT.sub("", text)):
         if match["id"] is not None:
             number = int(match["id"])
-            identifier, is_extended = number & ~EXTENDED, bool(number & EXTENDED)
+            identifier = -1 if number == NO_FRAME else number & ~EXTENDED
             messages.append(
-                OracleMessage(match["message"], identifier, is_extended, int(match["size"]), [])
+                OracleMessage(
+                    match["message"], identifier, bool(number & EXTENDED), int(match["size"]), []
+                )
             )
-            if number == NO_FRAME:
-                messages[-1].identifier = -1
-        elif match["signal"] is not None and messages:
+        elif match["signal"] is None:
+            descriptions.append(match)
+        elif messages:
             messages[-1].signals.append(_signal(match))
-        elif match["float_id"] is not None and match["float_type"] != "0":
-            for signal in _find(messages, match["float_id"], match["float_signal"]):
-                signal.is_float = True
-        elif match["range_id"] is not None:
-            pairs = re.findall(r"(\d+)-(\d+)", match["ranges"])
-            for signal in _find(messages, match["range_id"], match["range_signal"]):
-                signal.parent = match["parent"]
-                signal.ranges = tuple((int(low), int(high)) for low, high in pairs)
-        elif match["long_id"] is not None:
-            for message in _of_identifier(messages, match["long_id"]):
-                message.name = match["long"]
-        elif match["long_signal_id"] is not None:
-            long_names.append((match["long_signal_id"], match["short"], match["long"]))
-        elif match["word_id"] is not None:
-            pairs = WORD.findall(match["words"])
-            for signal in _find(messages, match["word_id"], match["word_signal"]):
-                signal.words = {int(float(number)): text[1:-1] for number, text in pairs}
+    for match in descriptions:
+        _describe_signals(messages, match)
     for message in messages:
         _name_parents(message)
-    for number, short, long in long_names:
-        for message in _of_identifier(messages, number):
-            _rename(message, short, long)
+    for match in descriptions:
+        _rename(messages, match)
     return [message for message in messages if message.identifier >= 0]
+
+
+def _describe_signals(messages: Sequence[OracleMessage], match: re.Match[str]) -> None:
+    """Take over what a statement says of the type, the multiplexer or the words of a signal."""
+    if match["float_id"] is not None and match["float_type"] != "0":
+        for signal in _find(messages, match["float_id"], match["float_signal"]):
+            signal.is_float = True
+    elif match["range_id"] is not None:
+        pairs = re.findall(r"(\d+)-(\d+)", match["ranges"])
+        for signal in _find(messages, match["range_id"], match["range_signal"]):
+            signal.parent = match["parent"]
+            signal.ranges = tuple((int(low), int(high)) for low, high in pairs)
+    elif match["word_id"] is not None:
+        words = WORD.findall(match["words"])
+        for signal in _find(messages, match["word_id"], match["word_signal"]):
+            signal.words = {int(float(number)): text[1:-1] for number, text in words}
 
 
 def _signal(match: re.Match[str]) -> OracleSignal:
@@ -217,11 +219,17 @@ def _name_parents(message: OracleMessage) -> None:
             signal.parent = roots[0]
 
 
-def _rename(message: OracleMessage, short: str, long: str) -> None:
-    """Give a signal, and the signals that it selects, its long name."""
-    for signal in message.signals:
-        signal.name = long if signal.name == short else signal.name
-        signal.parent = long if signal.parent == short else signal.parent
+def _rename(messages: Sequence[OracleMessage], match: re.Match[str]) -> None:
+    """Give a message, or a signal and the signals that it selects, its long name."""
+    long, short = match["long"], match["short"]
+    if match["long_id"] is not None:
+        for message in _of_identifier(messages, match["long_id"]):
+            message.name = long
+    elif match["long_signal_id"] is not None:
+        for message in _of_identifier(messages, match["long_signal_id"]):
+            for signal in message.signals:
+                signal.name = long if signal.name == short else signal.name
+                signal.parent = long if signal.parent == short else signal.parent
 
 
 def _find(messages: Sequence[OracleMessage], number: str, name: str) -> list[OracleSignal]:
