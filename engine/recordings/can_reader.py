@@ -34,7 +34,7 @@ MAX_SHOWN = 3
 
 
 def read_can(path: Path, mapping: RecordingMap) -> RecordedFile:
-    """Read a log of CAN frames (`.blf`, `.asc`, `.trc`, `.log`) with the databases of the map.
+    """Read a log of CAN frames with the databases of the map.
 
     Error and remote frames are left out, see `decode_can` for the names. Raises SpecError if a file
     cannot be read or understood, the log is empty or too large, or the map names no database;
@@ -47,7 +47,7 @@ def read_can(path: Path, mapping: RecordingMap) -> RecordedFile:
         label = f"map `{mapping.name}` names no DBC, which a log of CAN frames needs"
         raise SpecError([Problem("missing", mapping.span, label, "`dbc: vehicle.dbc` in the map")])
     messages, assumed = read_databases(mapping, cantools)
-    return decode_can(source, messages, read_can_log(path, source, can), tuple(assumed))
+    return decode_can(source, messages, read_can_log(path, source, can, mapping), tuple(assumed))
 
 
 def import_can(what: str) -> tuple[Any, Any]:
