@@ -300,7 +300,7 @@ def _load_messages(
         return cantools.database.load_file(path, strict=False).messages, [], []
     text = read_dbc_text(data, name)
     messages: list[Any] = []
-    for k in range(MAX_ROUNDS + 1):
+    for k in range(MAX_ROUNDS + 1 if any(text.lines) else 0):
         try:
             written = "\n".join(text.lines) + "\n"
             messages = cantools.database.load_string(written, "dbc", strict=False).messages

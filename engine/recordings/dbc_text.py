@@ -95,9 +95,14 @@ class DbcText:
 
 
 def read_dbc_text(data: bytes, name: str) -> DbcText:
-    """Return the lines of a DBC file that decoding needs; `name` is its name in assumptions."""
+    """Return the lines of a DBC file that decoding needs; `name` is its name in assumptions.
+
+    Raises ValueError if the file has no statement.
+    """
     text = DbcText(_remove_comments(_decode(data)).splitlines())
     bounds = list(find_statements(text.lines))
+    if not bounds:
+        raise ValueError("it has no statement of a DBC")
     extended: dict[int, int] = {}
     is_kept, message = None, ""
     for start, end in bounds:
@@ -121,7 +126,7 @@ def read_dbc_text(data: bytes, name: str) -> DbcText:
                 message = next(iter(statement.split()[2:]), "").rstrip(":")
             elif match := SELECTED.match(statement):
                 text.selected[message, match["name"]] = int(match["value"])
-    before = bounds[0][0] if bounds else len(text.lines)
+    before = bounds[0][0]
     text.lines[:before] = [""] * before
     _mark_extended(text, extended, name)
     return text
