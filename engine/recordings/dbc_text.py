@@ -73,13 +73,20 @@ class DbcText:
     def complete(self, messages: list[Any]) -> None:
         """Give messages and signals of cantools the names that the file gives them.
 
-        A signal whose message has no multiplexer gets its value, which cantools passes over.
+        A signal that cantools takes for one of all frames, although a value of a multiplexer
+        selects it, gets this value, and the multiplexer of its message if that has a single one.
         """
         for message in messages:
+            roots = [
+                signal.name
+                for signal in message.signals
+                if signal.is_multiplexer and (message.name, signal.name) not in self.selected
+            ]
             for signal in message.signals:
                 value = self.selected.get((message.name, signal.name))
                 if value is not None and not signal.multiplexer_ids:
                     signal.multiplexer_ids = [value]
+                    signal.multiplexer_signal = roots[0] if len(roots) == 1 else None
             number = message.frame_id | (EXTENDED_BIT if message.is_extended_frame else 0)
             names = {s.name: self._name(number, s.name) for s in message.signals}
             for signal in message.signals:

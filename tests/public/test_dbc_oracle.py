@@ -71,11 +71,11 @@ def test_statements_by_hand() -> None:
     motor, speed = parse_dbc(DBC)
     assert (motor.name, motor.identifier, motor.is_extended, motor.size) == ("Motor", 256, False, 8)
     assert [signal.name for signal in motor.signals] == ["T_em", "n_em", "big", "flag"]
-    data = bytes.fromhex("3000 7D1 0 8000 0000 80".replace(" ", ""))
+    data = bytes.fromhex("3000 7D10 8000 0080")
     torque, rate, big, flag = motor.signals
     assert (torque.value(data), torque.unit) == (0x30 * 0.25 - 10, "Nm")
     assert rate.value(data) == 2 * 0x7D1
-    assert (big.value(data), flag.value(data), flag.words) == (0.0, 1.0, {0: "off", 1: "on"})
+    assert (big.value(data), flag.value(data), flag.words) == (-32768.0, 1.0, {0: "off", 1: "on"})
     assert (speed.identifier, speed.is_extended) == (0x18FEF1FE, True)
     frames = {"03" + "0000C03F" + "00" * 3: {"Index", "speed"}, "050100FF" + "00" * 4: {
         "Index", "Sub", "deep"}, "05" + "03" + "00" * 6: {"Index", "Sub"},
