@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -202,11 +203,16 @@ def _numeric_columns(file: RecordedFile, time: str) -> Iterator[str]:
 
 
 def _distinct_names(file: RecordedFile, time: str) -> list[str]:
-    """Return each name except those of time; the shorter one of two names of a signal."""
-    distinct = dict.fromkeys(file.names)
-    names = [n for n in distinct if n != time and not CHANNEL_TIME_NAME.fullmatch(n)]
+    """Return each name except those of time; the shortest name of a signal that is its own."""
+    counts = Counter(file.names)
+    names = [n for n in counts if n != time and not CHANNEL_TIME_NAME.fullmatch(n)]
     if file.is_stamped:
-        names = [n for n in names if n.rpartition(".")[2] == n or n.rpartition(".")[2] not in names]
+        parts = {name: name.split(".") for name in names}
+        names = [
+            name
+            for name, words in parts.items()
+            if not any(counts[".".join(words[k:])] == 1 for k in range(1, len(words)))
+        ]
     return names
 
 
