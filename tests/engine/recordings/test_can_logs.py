@@ -330,8 +330,8 @@ class TestText:
         [
             (
                 "a.log",
-                " (1700000000.000000)  can0  100   [4]  08 00 64 00\n",
-                "a.log:1:1: error: this is what `candump` writes to the screen, and no log",
+                "  can0  100   [4]  08 00 64 00\n",
+                "a.log:1:1: error: the frames have no time stamps",
                 "`candump -L` or `candump -l` write a log",
             ),
             (
