@@ -39,6 +39,10 @@ BAD_MESSAGE = re.compile(r"in message (\w+)")
 """Error of cantools that names a message."""
 IMPORT = re.compile(r'"IMPORT ([\w./-]+)"')
 """Comment of a part of a DBC file that names another part, in the generator of opendbc."""
+LIBRARY_ERROR = re.compile(r"^[A-Z]+: ")
+"""Start of an error of cantools, with the format of the file."""
+CONVERT_HELP = "a DBC file of the same bus is read (the package canmatrix converts databases)"
+"""What helps if a database of another format cannot be understood."""
 NO_MESSAGE = "contains no message"
 """Value of the assumption that a database has no message."""
 J1939_NULL_ADDRESS = 0xFE
@@ -259,6 +263,7 @@ def _read_database(
         label = f"`{written.text}` cannot be read: {error.strerror or error}"
         problems.error("unreadable", written.span, label)
         return []
+    is_dbc = path.suffix.lower() == DATABASE_SUFFIXES[0]
     if is_lfs_pointer(data):
         label = f"`{written.text}` is a pointer of Git LFS, and not the database"
         problems.error("unreadable", written.span, label, LFS_HELP)
@@ -267,10 +272,10 @@ def _read_database(
         messages, left_out, repaired = _load_messages(path, data, written.text, cantools)
         assumed += repaired
     except Exception as error:  # the library raises errors of any type for a broken file
-        text = str(error).removeprefix("DBC: ").strip('"').replace(">>!<<", "")
+        text = LIBRARY_ERROR.sub("", str(error)).strip('"').replace(">>!<<", "")
         reason = " ".join(text.split()) or first_line(error)
         label = f"`{written.text}` cannot be understood: {reason}"
-        problems.error("unreadable", written.span, label)
+        problems.error("unreadable", written.span, label, "" if is_dbc else CONVERT_HELP)
         return []
     if left_out:
         value = f"{len(left_out)} statements left out"
@@ -280,7 +285,7 @@ def _read_database(
         problems.error("unreadable", written.span, label)
     elif not messages:
         parts = IMPORT.findall(data.decode("utf-8", "replace"))
-        reason = "the file has no statement `BO_`"
+        reason = "the file has no statement `BO_`" if is_dbc else "the file defines no frame"
         if parts:
             reason += ", but names other files: `dbc:` in the map lists them instead: "
             reason += ", ".join(f"`{part}`" for part in parts)

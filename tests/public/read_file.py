@@ -188,12 +188,14 @@ def _compare_signals(
     Names that stand for several signals even with their identifier are passed over.
     """
     names = list(file.names)
+    known = set(names)
     count = 0
     for key, messages in found.items():
         for message in messages:
             for signal in message.signals:
                 name = f"{message.name}.{signal.name}"
-                name = f"{key[0]:#x}.{name}" if names.count(name) > 1 else name
+                longer = f"{key[0]:#x}.{name}"
+                name = longer if longer in known else name
                 wanted = {
                     float(time): signal.value(data)
                     for time, data in frames[key]
@@ -202,7 +204,7 @@ def _compare_signals(
                 }
                 if names.count(name) > 1:
                     continue
-                if name not in names:
+                if name not in known:
                     return Outcome(f"differs: {name} is missing", count)
                 if wanted and not _is_equal(file, name, wanted):
                     return Outcome(f"differs: {name}", count)

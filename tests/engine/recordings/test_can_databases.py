@@ -119,6 +119,15 @@ class TestStatements:
         text = told(write(tmp_path, "a.log", motor_lines(), ""), MAP)
         assert "error: `car.dbc` has no message" in text
 
+    @pytest.mark.parametrize("name", ["car.arxml", "car.kcd", "car.sym"])
+    def test_another_database_that_is_damaged_is_told(self, tmp_path: Path, name: str) -> None:
+        (tmp_path / name).write_text("<a/>\n", "utf-8")
+        path = write(tmp_path, "a.log", motor_lines())
+        text = told(path, MAP.replace("car.dbc", name))
+        assert f"error: `{name}` cannot be understood: " in text
+        assert not any(word in text for word in ("ARXML:", "KCD:", "SYM:", ">>!<<"))
+        assert "help: a DBC file of the same bus is read" in text
+
     def test_a_pointer_of_git_lfs_is_named(self, tmp_path: Path) -> None:
         pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 9\n"
         path = write(tmp_path, "a.log", motor_lines())
