@@ -41,6 +41,8 @@ IMPORT = re.compile(r'"IMPORT ([\w./-]+)"')
 """Comment of a part of a DBC file that names another part, in the generator of opendbc."""
 LIBRARY_ERROR = re.compile(r"^[A-Z]+: ")
 """Start of an error of cantools, with the format of the file."""
+LIBRARY_FAULTS = (AttributeError, IndexError, KeyError, TypeError)
+"""Errors of cantools whose text says nothing to a user."""
 CONVERT_HELP = "a DBC file of the same bus is read (the package canmatrix converts databases)"
 """What helps if a database of another format cannot be understood."""
 NO_MESSAGE = "contains no message"
@@ -274,6 +276,8 @@ def _read_database(
     except Exception as error:  # the library raises errors of any type for a broken file
         text = LIBRARY_ERROR.sub("", str(error)).strip('"').replace(">>!<<", "")
         reason = " ".join(text.split()) or first_line(error)
+        if any(isinstance(part, LIBRARY_FAULTS) for part in (error, *vars(error).values())):
+            reason = "the package cantools fails at it"
         label = f"`{written.text}` cannot be understood: {reason}"
         problems.error("unreadable", written.span, label, "" if is_dbc else CONVERT_HELP)
         return []
