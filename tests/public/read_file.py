@@ -28,7 +28,7 @@ from language.expressions.units import parse_unit
 from language.model.system import CanDatabase, RecordingMap
 from language.text.diagnostic import Problems, Source, Span, SpecError
 from language.text.document import ScalarNode
-from tests.public.dbc_oracle import OracleMessage, read_dbc
+from tests.public.dbc_oracle import OracleMessage, OracleSignal, read_dbc
 
 MDF_SUFFIXES = (".mf4", ".mdf")
 """Suffixes of MDF files."""
@@ -166,7 +166,8 @@ def _random_frames(message: OracleMessage) -> Iterator[bytes]:
         yield generator.randbytes(message.size)
     for signal in message.signals:
         for _ in range(FRAMES // 2 if signal.parent else 0):
-            data, chain, selected = bytearray(generator.randbytes(message.size)), [], signal
+            data, selected = bytearray(generator.randbytes(message.size)), signal
+            chain: list[tuple[OracleSignal, int]] = []
             while selected.parent and len(chain) < len(message.signals):
                 parent = message.signal(selected.parent)
                 if parent is None:
