@@ -18,7 +18,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # A shell fragment that puts a Python that is new enough into $$python.
 find_python := python=$$(tools/find_python.sh $(PYTHON)) || exit
 
-.PHONY: help setup system-packages demo test long-test recordings-test target-test prove verify verify-part validate-diagnosis paper bench check
+.PHONY: help setup system-packages demo test long-test recordings-test public-files target-test prove verify verify-part validate-diagnosis paper bench check
 .PHONY: format generate lock clean
 .PHONY: check-lock check-format check-lint check-types check-floors check-specs check-tests check-generated
 
@@ -61,6 +61,9 @@ long-test: setup ## run the long ones: proofs, fuzzing, methods of integration
 
 recordings-test: setup ## run the tests of real recordings: ARGS="--recordings=DIR" or MODEWRIGHT_RECORDINGS
 	$(BIN)/pytest -n 2 --dist worksteal -q --ignore=tests/codegen/target -m recordings $(ARGS)
+
+public-files: setup ## read public files of third parties: DIR=folder with owner/name/path; without: how to obtain them
+	@$(BIN)/python -m tests.public.read_public_files $(if $(DIR),"$(DIR)",--how) $(ARGS)
 
 target-test: setup ## compare the C on an emulated Cortex-M4F with the engine, and prove contracts
 	$(BIN)/pytest -n 2 --dist worksteal -q tests/codegen/target $(ARGS)

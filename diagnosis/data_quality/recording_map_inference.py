@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -31,7 +32,7 @@ from language.expressions.units import (
     are_compatible,
     parse_unit,
 )
-from language.model.system import ColumnMapping, RecordingMap
+from language.model.system import CanDatabase, ColumnMapping, RecordingMap
 from language.overlays.expand_document import display_path
 from language.text.diagnostic import Problems, Source, Span, SpecError
 from language.text.document import ScalarNode
@@ -60,7 +61,8 @@ def guess_map(
 ) -> tuple[RecordingMap, tuple[Finding, ...]]:
     """Return a map of the first `MAX_COLUMNS` (12) numeric columns, and findings on the others.
 
-    `names` are the display names of files, `databases` the CAN databases of the command line. The
+    `names` are the display names of files, `databases` the CAN databases of the command line
+    (`car.dbc`, or `can0=car.dbc` for those of one bus). The
     time is a column of the first file with such a name, else one that increases. Units are those of
     the file, else of the suffix; columns in `INPUT_UNITS` are inputs. Raises SpecError without a
     time or a numeric column and for a file that cannot be opened; MissingToolError for a missing
@@ -68,7 +70,7 @@ def guess_map(
     """
     paths = list(names)
     place = Span(Source(display_path(paths[0])), 1, 1)
-    found = tuple(ScalarNode(name, Span(Source("command line"), 1, 1)) for name in databases)
+    found = tuple(map(read_database_option, databases))
     empty = unmapped("guessed from the names", place, found)
     problems = Problems()
     files = [open_recording(path, empty, problems) for path in paths]
@@ -95,7 +97,7 @@ def guess_map(
     return mapping, tuple(findings)
 
 
-def unmapped(name: str, place: Span, databases: tuple[ScalarNode, ...] = ()) -> RecordingMap:
+def unmapped(name: str, place: Span, databases: tuple[CanDatabase, ...] = ()) -> RecordingMap:
     """Return a map without columns, with which a file is opened before its columns are known."""
     return RecordingMap(name, "", parse_unit("s"), {}, {}, place, databases=databases)
 
@@ -112,6 +114,15 @@ def guess_time(file: RecordedFile) -> tuple[str, Unit, str]:
     time = _find_time_column(file, problems)
     problems.raise_if_errors()
     return time, *_guess_time_unit(file.read(time), time)
+
+
+def read_database_option(text: str) -> CanDatabase:
+    """Return the database of an option `FILE`, or `BUS=FILE`."""
+    bus, separator, name = text.partition("=")
+    span = Span(Source("command line"), 1, 1)
+    if separator and not Path(text).exists():
+        return CanDatabase(ScalarNode(name, span), bus)
+    return CanDatabase(ScalarNode(text, span))
 
 
 def _left_out_findings(file: RecordedFile, mapping: RecordingMap, name: str) -> list[Finding]:
@@ -200,11 +211,16 @@ def _numeric_columns(file: RecordedFile, time: str) -> Iterator[str]:
 
 
 def _distinct_names(file: RecordedFile, time: str) -> list[str]:
-    """Return each name except those of time; the shorter one of two names of a signal."""
-    distinct = dict.fromkeys(file.names)
-    names = [n for n in distinct if n != time and not CHANNEL_TIME_NAME.fullmatch(n)]
+    """Return each name except those of time; the shortest name of a signal that is its own."""
+    counts = Counter(file.names)
+    names = [n for n in counts if n != time and not CHANNEL_TIME_NAME.fullmatch(n)]
     if file.is_stamped:
-        names = [n for n in names if n.rpartition(".")[2] == n or n.rpartition(".")[2] not in names]
+        parts = {name: name.split(".") for name in names}
+        names = [
+            name
+            for name, words in parts.items()
+            if not any(counts[".".join(words[k:])] == 1 for k in range(1, len(words)))
+        ]
     return names
 
 

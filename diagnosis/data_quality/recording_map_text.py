@@ -12,6 +12,7 @@ from diagnosis.data_quality.recording_map_proposal import MapProposal
 from diagnosis.data_quality.signal_words import split_words
 from language.expressions.name_rules import NAME_PATTERN
 from language.expressions.units import Unit
+from language.model.system import CanDatabase
 from language.text.sanitise import escape_invisible
 
 PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_/*^.-]*")
@@ -27,7 +28,7 @@ def format_map(
     about: str,
     time: tuple[str, Unit],
     proposal: MapProposal,
-    databases: Sequence[str] = (),
+    databases: Sequence[CanDatabase] = (),
 ) -> str:
     """Return a proposed map as YAML text.
 
@@ -38,7 +39,7 @@ def format_map(
     if time[0]:
         lines.append(f"time: {{column: {_scalar(time[0])}, unit: {time[1].text}}}")
     if databases:
-        lines.append(f"dbc: [{', '.join(map(_quoted, databases))}]")
+        lines.append(f"dbc: {_format_databases(databases)}")
     lines.append("columns:" if proposal.columns else "columns: {}")
     for line in proposal.columns:
         if line.is_open:
@@ -48,6 +49,17 @@ def format_map(
         lines.append(f"  {_key(line.column)}: {_format_column(line)}")
     lines += [f"# {text}" for text in _remarks(proposal)]
     return "\n".join(lines) + "\n"
+
+
+def _format_databases(databases: Sequence[CanDatabase]) -> str:
+    """Return databases as a list, or as a mapping from buses to lists if one names a bus."""
+    by_bus: dict[str, list[str]] = {}
+    for one in databases:
+        by_bus.setdefault(one.bus, []).append(_quoted(one.file.text))
+    lists = {bus: f"[{', '.join(files)}]" for bus, files in by_bus.items()}
+    if set(lists) == {""}:
+        return lists[""]
+    return f"{{{', '.join(f'{_quoted(bus)}: {files}' for bus, files in lists.items())}}}"
 
 
 def map_name(stem: str) -> str:

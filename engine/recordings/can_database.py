@@ -14,9 +14,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from engine.recordings.recording_file import Assumption, first_line
+from engine.recordings.dbc_text import explain_left_out, find_statements, read_dbc_text
+from engine.recordings.recording_file import (
+    LFS_HELP,
+    Assumption,
+    first_line,
+    is_lfs_pointer,
+)
 from language.model.system import RecordingMap
-from language.text.diagnostic import Problems
+from language.text.diagnostic import Problem, Problems, SpecError
 from language.text.document import ScalarNode
 from language.text.project_boundary import path_exists, project_root_of, require_inside_project
 from language.text.regular_file import open_regular_file
@@ -31,21 +37,47 @@ SYNTAX_LINE = re.compile(r"[Ii]nvalid syntax at line (\d+)")
 """Error of cantools that names the line of a statement."""
 BAD_MESSAGE = re.compile(r"in message (\w+)")
 """Error of cantools that names a message."""
-STATEMENT = re.compile(r"[ \t]*([A-Z][A-Z_]*_|VERSION)\b")
-"""Keyword at the start of a DBC statement."""
-REQUIRED = ("VERSION", "NS_", "BS_", "BU_")
-"""Statements that cannot be left out."""
+IMPORT = re.compile(r'"IMPORT ([\w./-]+)"')
+"""Comment of a part of a DBC file that names another part, in the generator of opendbc."""
+LIBRARY_ERROR = re.compile(r"^[A-Z]+: ")
+"""Start of an error of cantools, with the format of the file."""
+LIBRARY_FAULTS = (AttributeError, IndexError, KeyError, TypeError)
+"""Errors of cantools whose text says nothing to a user."""
+CONVERT_HELP = "a DBC file of the same bus is read (the package canmatrix converts databases)"
+"""What helps if a database of another format cannot be understood."""
+NO_MESSAGE = "contains no message"
+"""Value of the assumption that a database has no message."""
 J1939_NULL_ADDRESS = 0xFE
 """Source address of messages in J1939 databases that any node sends."""
 
 
 @dataclass(frozen=True)
+class CanMessage:
+    """A message of a database (`definition`, of cantools), and the bus on which it is.
+
+    Without a bus (an empty text) the message is on each bus of a log.
+    """
+
+    definition: Any
+    bus: str = ""
+
+    def is_on(self, bus: str) -> bool:
+        """Return whether the message can be on a bus; the case of its name does not count."""
+        return self.bus.lower() in ("", bus.lower())
+
+
+@dataclass(frozen=True)
 class CanSignal:
-    """A signal of a message; `selector` selects the frames that contain it (multiplexing)."""
+    """A signal of a message; `selector` selects the frames that contain it (multiplexing).
+
+    `is_unselectable` tells that the database gives the signal values of a multiplexer that its
+    message does not have.
+    """
 
     message: Any
     signal: Any
     selector: CanSignal | None = None
+    is_unselectable: bool = False
 
     @cached_property
     def length(self) -> int:
@@ -89,7 +121,12 @@ class CanSignal:
             return True
         if not self.selector.is_selected(data):
             return False
-        return int(self.selector.decode(data, is_raw=True)) in self.signal.multiplexer_ids
+        return self.selector.selection(data) in self.signal.multiplexer_ids
+
+    def selection(self, data: bytes) -> int:
+        """Return the bits of a multiplexer as a number without sign, as databases list them."""
+        mask: int = (1 << self.signal.length) - 1
+        return int(self.decode(data, is_raw=True)) & mask
 
     def word(self, data: bytes) -> str:
         """Return the word of the database for the value of a frame; empty if it has none."""
@@ -124,16 +161,21 @@ def signals_of(message: Any) -> list[CanSignal]:
     """Return the signals of a message, with their selectors."""
     by_name = {signal.name: signal for signal in message.signals}
 
-    def with_selector(signal: Any) -> CanSignal:
-        parent = by_name.get(signal.multiplexer_signal) if signal.multiplexer_ids else None
-        return CanSignal(message, signal, with_selector(parent) if parent else None)
+    def with_selector(signal: Any, selected: tuple[str, ...] = ()) -> CanSignal:
+        if not signal.multiplexer_ids:
+            return CanSignal(message, signal)
+        parent = by_name.get(signal.multiplexer_signal)
+        if parent is None or parent.name in (*selected, signal.name):
+            return CanSignal(message, signal, is_unselectable=True)
+        selector = with_selector(parent, (*selected, signal.name))
+        return CanSignal(message, signal, selector, selector.is_unselectable)
 
     return [with_selector(signal) for signal in message.signals]
 
 
 def unknown_selection(message: Any, selector: CanSignal, data: bytes) -> int | None:
     """Return the value of a selector that no signal of its message has; None for a known value."""
-    value = int(selector.decode(data, is_raw=True))
+    value = selector.selection(data)
     name = selector.signal.name
     known = (s.multiplexer_ids for s in message.signals if s.multiplexer_signal == name)
     return None if any(value in ids for ids in known) else value
@@ -158,18 +200,21 @@ def is_j1939(message: Any) -> bool:
     return bool(message.protocol == "j1939" or message.frame_id & 0xFF == J1939_NULL_ADDRESS)
 
 
-def read_databases(mapping: RecordingMap, cantools: Any) -> tuple[list[Any], list[Assumption]]:
+def read_databases(
+    mapping: RecordingMap, cantools: Any
+) -> tuple[list[CanMessage], list[Assumption]]:
     """Return the messages of the databases of a map, and what is left out.
 
     A database is searched relative to the map, then to the working directory, and has to lie inside
-    the project. A message that two databases define in the same way is returned once. Raises
-    SpecError.
+    the project. A message that two databases of a bus define in the same way is returned once.
+    Raises SpecError, also if no database has a message.
     """
     logging.getLogger("cantools").setLevel(logging.CRITICAL)
     problems = Problems()
-    messages: dict[str, Any] = {}
+    messages: dict[tuple[str, str], CanMessage] = {}
     assumed: list[Assumption] = []
-    for written in mapping.databases:
+    for database in mapping.databases:
+        written = database.file
         folders = (Path(written.span.source.name).parent, Path())
         paths = [folder / written.text for folder in folders if path_exists(folder / written.text)]
         if not paths:
@@ -186,8 +231,14 @@ def read_databases(mapping: RecordingMap, cantools: Any) -> tuple[list[Any], lis
                 paths[0], written.span, project_root_of(Path(written.span.source.name))
             )
             for message in _read_database(paths[0], written, cantools, problems, assumed):
-                messages.setdefault(_definition(message), message)
+                key = (database.bus.lower(), _definition(message))
+                messages.setdefault(key, CanMessage(message, database.bus))
     problems.raise_if_errors()
+    if mapping.databases and not messages:
+        files = ", ".join(f"`{database.file.text}`" for database in mapping.databases)
+        label = f"{files} {'have' if len(mapping.databases) > 1 else 'has'} no message"
+        hint = "; ".join(item.reason for item in assumed if item.value == NO_MESSAGE)
+        raise SpecError([Problem("empty", mapping.databases[0].file.span, label, hint)])
     return list(messages.values()), assumed
 
 
@@ -214,62 +265,70 @@ def _read_database(
         label = f"`{written.text}` cannot be read: {error.strerror or error}"
         problems.error("unreadable", written.span, label)
         return []
+    is_dbc = path.suffix.lower() == DATABASE_SUFFIXES[0]
+    if is_lfs_pointer(data):
+        label = f"`{written.text}` is a pointer of Git LFS, and not the database"
+        problems.error("unreadable", written.span, label, LFS_HELP)
+        return []
     try:
-        messages, left_out = _load_messages(path, data, cantools)
+        messages, left_out, repaired = _load_messages(path, data, written.text, cantools)
+        assumed += repaired
     except Exception as error:  # the library raises errors of any type for a broken file
-        text = str(error).removeprefix("DBC: ").strip('"')
+        text = LIBRARY_ERROR.sub("", str(error)).strip('"').replace(">>!<<", "")
         reason = " ".join(text.split()) or first_line(error)
+        if any(isinstance(part, LIBRARY_FAULTS) for part in (error, *vars(error).values())):
+            reason = "the package cantools fails at it"
         label = f"`{written.text}` cannot be understood: {reason}"
-        problems.error("unreadable", written.span, label)
+        problems.error("unreadable", written.span, label, "" if is_dbc else CONVERT_HELP)
         return []
     if left_out:
         value = f"{len(left_out)} statements left out"
-        reason = f"{left_out[0]} does not fit the others or is no statement of a DBC"
-        assumed.append(Assumption(f"`{written.text}`", value, reason))
+        assumed.append(Assumption(f"`{written.text}`", value, left_out[0]))
     if left_out and not messages:
-        label = f"`{written.text}` cannot be understood: {left_out[0]} is no statement of a DBC"
+        label = f"`{written.text}` cannot be understood: {left_out[0]}"
         problems.error("unreadable", written.span, label)
+    elif not messages:
+        parts = IMPORT.findall(data.decode("utf-8", "replace"))
+        reason = "the file has no statement `BO_`" if is_dbc else "the file defines no frame"
+        if parts:
+            reason += ", but names other files: `dbc:` in the map lists them instead: "
+            reason += ", ".join(f"`{part}`" for part in parts)
+        assumed.append(Assumption(f"`{written.text}`", NO_MESSAGE, reason))
     return messages
 
 
-def _load_messages(path: Path, data: bytes, cantools: Any) -> tuple[Sequence[Any], list[str]]:
-    """Return the messages of a database, and texts for the statements that are left out.
+def _load_messages(
+    path: Path, data: bytes, name: str, cantools: Any
+) -> tuple[Sequence[Any], list[str], list[Assumption]]:
+    """Return the messages of a database, sentences on statements left out, and what is assumed.
 
     Statements of a DBC file that cantools refuses are left out in `MAX_ROUNDS` rounds at most.
     Raises the error of cantools that remains.
     """
     if path.suffix.lower() != ".dbc":
-        return cantools.database.load_file(path, strict=False).messages, []
-    lines = _decode(data).splitlines()
-    left_out: list[str] = []
-    for _ in range(MAX_ROUNDS):
+        return cantools.database.load_file(path, strict=False).messages, [], []
+    text = read_dbc_text(data, name)
+    messages: list[Any] = []
+    for k in range(MAX_ROUNDS + 1 if any(text.lines) else 0):
         try:
-            text = "\n".join(lines) + "\n"
-            return cantools.database.load_string(text, "dbc", strict=False).messages, left_out
+            written = "\n".join(text.lines) + "\n"
+            messages = cantools.database.load_string(written, "dbc", strict=False).messages
+            break
         except cantools.database.UnsupportedDatabaseFormatError as error:
-            removed = _blank_statements(lines, str(error))
+            removed = _blank_statements(text.lines, str(error)) if k < MAX_ROUNDS else []
             if not removed:
                 raise
-            left_out += removed
-    text = "\n".join(lines) + "\n"
-    return cantools.database.load_string(text, "dbc", strict=False).messages, left_out
-
-
-def _decode(data: bytes) -> str:
-    """Return the text of a DBC file in UTF-8, else in Windows-1252, as most tools write it."""
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return data.decode("cp1252", "replace")
+            text.left_out += removed
+    text.complete(messages)
+    return messages, text.left_out, text.assumptions
 
 
 def _blank_statements(lines: list[str], error: str) -> list[str]:
     """Replace the statements that an error of cantools names by blank lines.
 
-    Returns a text for each of them; empty if the error names none that can be left out.
+    Returns a sentence on each of them; empty if the error names none.
     """
-    starts = [k for k, line in enumerate(lines) if STATEMENT.match(line)]
-    bounds = list(zip(starts, [*starts[1:], len(lines)], strict=True))
+    bounds = list(find_statements(lines))
     chosen: list[int] = []
     for keyword, identifier, name in UNUSED.findall(error):
         pattern = re.compile(rf"\s*{keyword}\s+{identifier}\s+{name}\b")
@@ -283,13 +342,10 @@ def _blank_statements(lines: list[str], error: str) -> list[str]:
     removed = []
     for k in chosen:
         start, end = bounds[k]
-        keyword = STATEMENT.match(lines[start])[1]  # type: ignore[index]
-        if keyword in REQUIRED:
-            return []
-        if keyword == "BO_":  # without its head line its signals would belong to another message
+        if lines[start].lstrip().startswith("BO_"):  # its signals would belong to another message
             while k + 1 < len(bounds) and lines[bounds[k + 1][0]].lstrip().startswith("SG_ "):
                 k += 1
                 end = bounds[k][1]
-        removed.append(f"line {start + 1} (`{' '.join(lines[start].split()[:3])}`)")
+        removed.append(explain_left_out(start, lines[start]))
         lines[start:end] = [""] * (end - start)
     return removed

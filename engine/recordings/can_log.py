@@ -1,7 +1,8 @@
-"""CAN log: reads the frames of a log (candump, ASC, TRC, BLF) by bus and identifier.
+"""CAN log: reads the frames of a log (candump, ASC, TRC, BLF and others) by bus and identifier.
 
 The lines of a text log are checked first, because python-can ends at the first line that it cannot
-parse. Lines that are no complete frames are left out and told.
+parse. Lines that are no complete frames are left out and told. Logs that python-can does not know
+are read by their form, whatever their suffix is.
 """
 
 from __future__ import annotations
@@ -11,14 +12,25 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from engine.recordings.frame_table import find_frame_table, read_frame_table
+from engine.recordings.frame_text import (
+    HEAD_LINES,
+    FrameTextError,
+    find_line_format,
+    read_frame_lines,
+)
 from engine.recordings.recording_file import Assumption, first_line, unreadable_error
+from language.model.system import RecordingMap
 from language.text.diagnostic import Problem, Source, Span, SpecError
 
 LOG_SUFFIXES = (".blf", ".asc", ".log", ".trc")
 """Suffixes of logs of CAN frames."""
+TEXT_SUFFIXES = (".csv", ".txt")
+"""Suffixes of text files that may contain frames, if the map names a database."""
 CANDUMP_LINE = re.compile(
     r"\s*\(\d+(?:\.\d+)?\)\s+\S+\s+(?P<id>[0-9A-F]{3}|[0-9A-F]{8})#"
     r"(?:#[0-9A-F](?:[0-9A-F]{2})*|(?:[0-9A-F]{2})*|R[0-9A-F]?)(?:\s+[RT])?\s*",
@@ -27,8 +39,8 @@ CANDUMP_LINE = re.compile(
 """Pattern of a frame that `candump -L` writes."""
 CANDUMP_ERROR_FLAG = 0x20000000
 """Bit of the identifier of an error frame in a candump log."""
-CANDUMP_SCREEN = re.compile(r"\s*(?:\([\d.:\s-]+\)\s+)?\w+\s+[0-9A-F]+\s+\[\d+\]", re.IGNORECASE)
-"""Pattern of a line that candump writes to the screen, which is no log."""
+CANDUMP_SCREEN = re.compile(r"\s*\w+\s+[0-9A-F]+\s+\[\d+\]", re.IGNORECASE)
+"""Pattern of a line without time stamp that candump writes to the screen."""
 ASC_STAMP = re.compile(r"(\s*)(\d+)([.,])(\d+)(?=\s)", re.ASCII)
 """Pattern of the time stamp at the start of an ASC line."""
 ASC_RELATIVE = re.compile(r"\s*base\s+(?:hex|dec)\s+timestamps\s+relative", re.IGNORECASE)
@@ -42,6 +54,8 @@ TRC_FRAME = re.compile(
 """Pattern of the start of a frame in a TRC log."""
 TRC_VERSIONS = "1.0, 1.1, 1.3, 2.0 and 2.1"
 """Versions of TRC that python-can reads."""
+HEAD_BYTES = 8192
+"""Number of bytes at the start of a file that show whether it contains frames."""
 MAX_SHOWN = 60
 """Number of characters of a line that a message shows."""
 
@@ -78,12 +92,12 @@ class _BadLine(NamedTuple):
     reason: str
 
 
-def read_can_log(path: Path, source: Source, can: Any) -> CanLog:
+def read_can_log(path: Path, source: Source, can: Any, mapping: RecordingMap) -> CanLog:
     """Return the data frames of a log; error and remote frames are left out.
 
     `can` is the package python-can. A frame that repeats the one before (same bus, identifier,
-    time stamp and data) is left out. Raises SpecError if the log has no frame, or more lines that
-    cannot be understood than frames.
+    time stamp and data) is left out. The map states the unit of time of a table of frames. Raises
+    SpecError if the log has no data frame, or more lines that cannot be understood than frames.
     """
     logging.getLogger("can").setLevel(logging.CRITICAL)
     suffix = path.suffix.lower()
@@ -91,7 +105,7 @@ def read_can_log(path: Path, source: Source, can: Any) -> CanLog:
     if suffix == ".blf":
         numbered = _read_binary(path, source, can, assumed)
     else:
-        numbered = _read_text(path, source, can, assumed)
+        numbered = _read_text(path, source, can, mapping, assumed)
     frames: dict[FrameKey, list[CanFrame]] = {}
     for line, frame in numbered:
         if not (frame.is_error_frame or frame.is_remote_frame):
@@ -99,6 +113,11 @@ def read_can_log(path: Path, source: Source, can: Any) -> CanLog:
             key = FrameKey(bus, frame.arbitration_id, frame.is_extended_id)
             found = CanFrame(frame.timestamp, bytes(frame.data), line)
             frames.setdefault(key, []).append(found)
+    if not frames:
+        label = "the log has no data frame of a CAN bus"
+        if numbered:
+            label += ": it has only error frames and remote frames"
+        raise SpecError([Problem("empty", Span(source, 1, 1), label)])
     return CanLog(remove_repeated_frames(frames, assumed), tuple(assumed))
 
 
@@ -161,14 +180,88 @@ def _read_binary(
     return frames
 
 
+def holds_frames(path: Path) -> bool:
+    """Return whether a text file (`TEXT_SUFFIXES`) contains CAN frames in a form that is read.
+
+    A file that cannot be read contains none.
+    """
+    if path.suffix.lower() not in TEXT_SUFFIXES:
+        return False
+    try:
+        with path.open("rb") as file:
+            lines = _decode_text(file.read(HEAD_BYTES)).splitlines()
+    except OSError:
+        return False
+    is_candump = any(CANDUMP_LINE.fullmatch(line) for line in lines[:HEAD_LINES])
+    return is_candump or bool(find_frame_table(lines) or find_line_format(lines))
+
+
 def _read_text(
-    path: Path, source: Source, can: Any, assumed: list[Assumption]
+    path: Path, source: Source, can: Any, mapping: RecordingMap, assumed: list[Assumption]
 ) -> list[tuple[int, Any]]:
     """Return the frames of a text log with the numbers of their lines. Raises SpecError."""
     text = _decode_text(path.read_bytes())
     lines = list(enumerate(text.splitlines(), start=1))
     bad: list[_BadLine] = []
     suffix = path.suffix.lower()
+    frames = _read_other_form(source, text, lines, mapping, bad, assumed)
+    if frames is None:
+        suffix = suffix if suffix in LOG_SUFFIXES else ".log"
+        frames = _read_known_form(suffix, text, lines, can, bad, assumed)
+    bad.sort()
+    if len(bad) > len(frames) or not frames:
+        raise _no_log_error(source, suffix, lines, bad)
+    if bad:
+        first = bad[0]
+        reason = f"line {first.number} {first.reason}: `{_crop(first.text)}`"
+        assumed.append(Assumption("lines", f"{len(bad)} left out", reason))
+    return frames
+
+
+def _read_other_form(
+    source: Source,
+    text: str,
+    lines: list[tuple[int, str]],
+    mapping: RecordingMap,
+    bad: list[_BadLine],
+    assumed: list[Assumption],
+) -> list[tuple[int, Any]] | None:
+    """Return the frames of a log that python-can does not read; None for another log.
+
+    Raises SpecError if the time stamps of the log cannot be used.
+    """
+    written = [line for _, line in lines]
+    if any(CANDUMP_LINE.fullmatch(line) for line in written[:HEAD_LINES]):
+        return None
+    form, table = find_line_format(written), find_frame_table(written)
+    if form is None and table is None:
+        return None
+    _drop_cut_line(text, lines, bad)
+    try:
+        if table is None or form is not None:
+            assert form is not None
+            frames, cut = read_frame_lines(form, lines)
+        else:
+            body = lines[table.line :]
+            time, unit = mapping.time, mapping.time_unit
+            frames, cut = read_frame_table(table, body, time, unit, mapping.date_order)
+            assumed += table.assumptions
+    except FrameTextError as error:
+        span = Span(source, error.line, 1)
+        raise SpecError([Problem("time", span, str(error), error.help)]) from None
+    bad += [_BadLine(number, line, "is no complete frame") for number, line in cut]
+    return frames
+
+
+def _read_known_form(
+    suffix: str,
+    text: str,
+    lines: list[tuple[int, str]],
+    can: Any,
+    bad: list[_BadLine],
+    assumed: list[Assumption],
+) -> list[tuple[int, Any]]:
+    """Return the frames of a log of a form (`LOG_SUFFIXES`) that python-can reads."""
     is_header: Callable[[str], bool] = _is_trc_header
     if suffix != ".log":
         _drop_cut_line(text, lines, bad)
@@ -184,15 +277,7 @@ def _read_text(
     body = [(number, line) for number, line in checked if not is_header(line)]
     if suffix == ".asc":
         header = _complete_asc_header(header, assumed)
-    frames = list(_parse_lines(reader, header, body, bad))
-    bad.sort()
-    if len(bad) > len(frames) or not frames:
-        raise _no_log_error(source, suffix, lines, bad)
-    if bad:
-        first = bad[0]
-        reason = f"line {first.number} {first.reason}: `{_crop(first.text)}`"
-        assumed.append(Assumption("lines", f"{len(bad)} left out", reason))
-    return frames
+    return list(_parse_lines(reader, header, body, bad))
 
 
 def _decode_text(data: bytes) -> str:
@@ -323,7 +408,7 @@ def _parse_lines(
     read: set[int] = set()
     start = 0
     while start < len(body):
-        feed = _LineFeed([*header, *body[start:]])
+        feed = _LineFeed(chain(header, (body[k] for k in range(start, len(body)))))
         try:
             for frame in reader(feed):
                 read.add(feed.number)
@@ -353,7 +438,7 @@ def _no_log_error(
         "`;$FILEVERSION=`",
     }[suffix]
     if suffix == ".log" and CANDUMP_SCREEN.match(line):
-        label = "this is what `candump` writes to the screen, and no log"
+        label = "the frames have no time stamps: this is what `candump` writes to the screen"
         help = "`candump -L` or `candump -l` write a log"
     if suffix == ".log" and not bad:
         label, help = "the log has no data frames", ""

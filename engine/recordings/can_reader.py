@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from engine.recordings.can_database import (
+    CanMessage,
     CanSignal,
     is_j1939,
     parameter_group,
@@ -33,7 +34,7 @@ MAX_SHOWN = 3
 
 
 def read_can(path: Path, mapping: RecordingMap) -> RecordedFile:
-    """Read a log of CAN frames (`.blf`, `.asc`, `.trc`, `.log`) with the databases of the map.
+    """Read a log of CAN frames with the databases of the map.
 
     Error and remote frames are left out, see `decode_can` for the names. Raises SpecError if a file
     cannot be read or understood, the log is empty or too large, or the map names no database;
@@ -46,7 +47,7 @@ def read_can(path: Path, mapping: RecordingMap) -> RecordedFile:
         label = f"map `{mapping.name}` names no DBC, which a log of CAN frames needs"
         raise SpecError([Problem("missing", mapping.span, label, "`dbc: vehicle.dbc` in the map")])
     messages, assumed = read_databases(mapping, cantools)
-    return decode_can(source, messages, read_can_log(path, source, can), tuple(assumed))
+    return decode_can(source, messages, read_can_log(path, source, can, mapping), tuple(assumed))
 
 
 def import_can(what: str) -> tuple[Any, Any]:
@@ -62,13 +63,14 @@ def import_can(what: str) -> tuple[Any, Any]:
 
 
 def decode_can(
-    source: Source, messages: list[Any], log: CanLog, assumed: tuple[Assumption, ...] = ()
+    source: Source, messages: list[CanMessage], log: CanLog, assumed: tuple[Assumption, ...] = ()
 ) -> RecordedFile:
     """Return a log as a recorded file of the signals whose messages occur in it.
 
-    A message is found by its identifier, else (J1939) by its parameter group. Names are `signal`
-    and `message.signal`. If a message is on several buses, there is `bus.message.signal`, too, and
-    for several sources of a parameter group `0x18f00400.message.signal`. A name that stands for
+    A message is found by its identifier, else (J1939) by its parameter group, on the bus of its
+    database. Names are `signal` and `message.signal`. If messages of a name are on several buses,
+    there is `bus.message.signal`, too, and for several identifiers `0x18f00400.message.signal`.
+    A name that stands for
     several signals occurs once for each of them and cannot be read. A signal is decoded when it is
     read. `Samples.assumptions` tell frames that are left out; reading raises SpecError if these
     are all.
@@ -88,32 +90,33 @@ class _Place(NamedTuple):
 class _DecodedLog:
     """Frames of a log with the messages that decode them."""
 
-    def __init__(self, source: Source, messages: list[Any], log: CanLog) -> None:
+    def __init__(self, source: Source, messages: list[CanMessage], log: CanLog) -> None:
         self.source = source
         self.messages = messages
         self.log = log
         self.places: dict[str, list[_Place]] = {}
-        for message in messages:
-            for place in self._places_of(message):
+        found = [(message.definition, *self._keys_of(message)) for message in messages]
+        keys_by_name: dict[str, set[FrameKey]] = {}
+        for message, keys, _ in found:
+            keys_by_name.setdefault(message.name, set()).update(keys)
+        for message, keys, by_group in found:
+            for place in _places_of(message, keys, by_group, keys_by_name[message.name]):
                 for name in place.names:
                     self.places.setdefault(name, []).append(place)
 
-    def _places_of(self, message: Any) -> Iterator[_Place]:
-        """Yield the signals of a message for each key of its frames in the log."""
-        identity = (message.frame_id, message.is_extended_frame)
-        keys = [key for key in self.log.frames if key[1:] == identity]
-        by_group = not keys and is_j1939(message)
+    def _keys_of(self, message: CanMessage) -> tuple[list[FrameKey], bool]:
+        """Return the keys of the frames of a message, and whether its parameter group found them.
+
+        The buses are those of its database.
+        """
+        definition = message.definition
+        identity = (definition.frame_id, definition.is_extended_frame)
+        keys = [key for key in self.log.frames if key[1:] == identity and message.is_on(key.bus)]
+        by_group = not keys and is_j1939(definition)
         if by_group:
-            keys = self._keys_of_group(message.frame_id)
-        for key in keys:
-            for signal in signals_of(message):
-                short = f"{message.name}.{signal.signal.name}"
-                names = [signal.signal.name, short]
-                if len({other.identifier for other in keys}) > 1:
-                    names.append(f"{key.identifier:#x}.{short}")
-                if len({other.bus for other in keys}) > 1:
-                    names.append(f"{key.bus}.{names[-1]}")
-                yield _Place(key, signal, tuple(names), by_group)
+            group = self._keys_of_group(definition.frame_id)
+            keys = [key for key in group if message.is_on(key.bus)]
+        return keys, by_group
 
     def _keys_of_group(self, identifier: int) -> list[FrameKey]:
         """Return the keys of extended frames with the parameter group of an identifier."""
@@ -142,16 +145,33 @@ class _DecodedLog:
 
     def explain_missing(self, name: str) -> str:
         """Return the reason why a signal is missing; an empty text if none is known."""
-        for message in self.messages:
+        for declared in self.messages:
+            message = declared.definition
             for signal in message.signals:
                 if name in (signal.name, f"{message.name}.{signal.name}"):
                     number = f"{message.frame_id:#x}"
                     text = f"its message `{message.name}` ({number}) is not in the log"
+                    if declared.bus:
+                        text = f"its message `{message.name}` ({number}) is not on the bus "
+                        return text + f"`{declared.bus}`; {self._list_buses()}"
                     return text + self._explain_near(message)
-        known = {(message.frame_id, message.is_extended_frame) for message in self.messages}
+        buses = {key.bus.lower() for key in self.log.frames}
+        for declared in self.messages:
+            if declared.bus and declared.bus.lower() not in buses:
+                return f"the log has no bus `{declared.bus}`; {self._list_buses()}"
+        known = {
+            (one.definition.frame_id, one.definition.is_extended_frame) for one in self.messages
+        }
         if not any(key[1:] in known for key in self.log.frames):
             return f"the DBC has none of the {len(self.log.frames)} messages of the log"
         return ""
+
+    def _list_buses(self) -> str:
+        """Return the names of the buses of the log for messages."""
+        buses = sorted({key.bus for key in self.log.frames})
+        if not any(buses):
+            return "the log names no bus, so that `dbc:` must not name one either"
+        return f"the log has {_join([f'`{bus}`' for bus in buses if bus])}"
 
     def _explain_near(self, message: Any) -> str:
         """Return the identifiers of the log that resemble that of a message; else an empty text.
@@ -185,7 +205,8 @@ class _DecodedLog:
         """Return the longer names of the signals that a name stands for."""
         longest = list(dict.fromkeys(place.names[-1] for place in self.places[name]))
         if len(longest) == 1:
-            return f"several DBC files define `{longest[0]}` differently: name the right one only"
+            text = f"the DBC files define `{longest[0]}` several times: name the right file only"
+            return text + ", or one for each bus, as in `dbc: {can0: a.dbc, can1: b.dbc}`"
         return f"`column:` in the map names one of them: {_join(f'`{one}`' for one in longest)}"
 
     def samples(self, name: str) -> Samples:
@@ -197,6 +218,13 @@ class _DecodedLog:
         """
         (place,) = self.places[name]
         signal, frames = place.signal, self.log.frames[place.key]
+        if signal.is_unselectable:
+            label = (
+                f"signal `{signal.signal.name}` cannot be read: the DBC says that a multiplexer "
+            )
+            label += f"of message `{signal.message.name}` selects it, but the message has none"
+            hint = "a multiplexer has `M` behind its name in the DBC: ` SG_ Index M : 0|4@1+ ...`"
+            raise SpecError([Problem("empty", Span(self.source, frames[0].line, 1), label, hint)])
         assumed = self._assumptions_of(place)
         whole = [frame for frame in frames if len(frame.data) >= signal.length]
         if len(whole) < len(frames):
@@ -242,6 +270,27 @@ class _DecodedLog:
             subject = f"signal `{place.signal.signal.name}`"
             assumed.append(Assumption(subject, "read as the DBC states", reason))
         return assumed
+
+
+def _places_of(
+    message: Any, keys: list[FrameKey], by_group: bool, named: set[FrameKey]
+) -> Iterator[_Place]:
+    """Yield the signals of a message for each of its keys.
+
+    `named` are the keys of all messages of its name: if these differ in identifier or bus, longer
+    names contain them.
+    """
+    has_identifiers = len({(key.identifier, key.is_extended) for key in named}) > 1
+    has_buses = len({key.bus for key in named}) > 1
+    for key in keys:
+        for signal in signals_of(message):
+            short = f"{message.name}.{signal.signal.name}"
+            names = [signal.signal.name, short]
+            if has_identifiers:
+                names.append(f"{key.identifier:#x}.{short}")
+            if has_buses:
+                names.append(f"{key.bus}.{names[-1]}")
+            yield _Place(key, signal, tuple(names), by_group)
 
 
 def _explain_short(signal: CanSignal, frames: list[CanFrame]) -> Assumption:

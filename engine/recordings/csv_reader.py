@@ -14,6 +14,7 @@ from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 
+from engine.recordings.frame_table import find_frame_table
 from engine.recordings.recording_file import (
     MAX_BYTES,
     MAX_PROBLEMS,
@@ -183,11 +184,13 @@ class _CsvRows:
         return [text if unit_meanings(text) and not text.isdigit() else "" for text in texts]
 
     def explain_missing(self, name: str) -> str:
-        """Return the name with its unit in brackets, or why the head line has one cell only."""
+        """Return the name with its unit in brackets, or what the head line shows."""
         for written in self.head:
             match = NAME_WITH_UNIT.fullmatch(written)
             if match and written.startswith(name) and written[len(name) :].lstrip()[:1] in "[(":
                 return f"did you mean `{written}`?"
+        if find_frame_table(self.source.lines):
+            return "the rows are CAN frames: `dbc: vehicle.dbc` in the map decodes them"
         if len(self.head) == 1:
             return "the cells are divided by a comma, semicolon, tab or bar"
         return ""

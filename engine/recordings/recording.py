@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.recordings.can_log import LOG_SUFFIXES, holds_frames
 from engine.recordings.channel_reader import ChannelReader, require_names
 from engine.recordings.csv_reader import read_csv
 from engine.recordings.recording_file import Assumption, RecordedFile, require_regular_file
@@ -162,9 +163,10 @@ def open_recording(path: Path, mapping: RecordingMap, problems: Problems) -> Rec
     """Open a file by its suffix in any case; a time window at the end of the path is ignored.
 
     `.parquet` is Parquet; `.mf4`, `.mdf`, and `.dat` that starts with `MDF` are MDF; `.blf`,
-    `.asc`, `.trc` and `.log` are CAN logs; all others CSV, whose faulty rows are added to
-    `problems`. Raises SpecError for a pipe, a device and a file that cannot be read, and
-    MissingToolError if a library is not installed.
+    `.asc`, `.trc` and `.log` are CAN logs, and so is a text file with frames, if the map names a
+    database; all others CSV, whose faulty rows are added to `problems`. Raises SpecError for a
+    pipe, a device and a file that cannot be read, and MissingToolError if a library is not
+    installed.
     """
     path = strip_window_suffix(path)
     require_regular_file(path, Source(display_path(path)))
@@ -177,7 +179,7 @@ def open_recording(path: Path, mapping: RecordingMap, problems: Problems) -> Rec
         from engine.recordings.mdf_reader import read_mdf
 
         return read_mdf(path, mapping)
-    if ending in (".blf", ".asc", ".trc", ".log"):
+    if ending in LOG_SUFFIXES or (mapping.databases and holds_frames(path)):
         from engine.recordings.can_reader import read_can
 
         return read_can(path, mapping)

@@ -22,6 +22,10 @@ NO_VALUE = re.compile(
     re.IGNORECASE,
 )
 """Words for a missing value in the value tables of DBC and MF4 files."""
+LFS_MARK = b"version https://git-lfs.github.com/spec/"
+"""First bytes of a pointer of Git LFS, which stands for a file that is not fetched yet."""
+LFS_HELP = "`git lfs pull` fetches the file itself"
+"""What helps if a file is a pointer of Git LFS."""
 
 
 @dataclass(frozen=True)
@@ -108,13 +112,23 @@ def require_size(path: Path, source: Source) -> None:
         raise SpecError([Problem("empty", Span(source, 1, 1), "the recording is empty")])
 
 
-def require_regular_file(path: Path, source: Source) -> None:
-    """Raise SpecError for a folder, and for a pipe or a device, which may be endless.
+def is_lfs_pointer(data: bytes) -> bool:
+    """Return whether the bytes of a file are those of a pointer of Git LFS."""
+    return data.startswith(LFS_MARK)
 
-    Files that are missing or may not be read pass; the reader reports them.
+
+def require_regular_file(path: Path, source: Source) -> None:
+    """Raise SpecError for a folder, for a pipe or a device, and for a pointer of Git LFS.
+
+    A pipe or a device may be endless. Files that are missing or may not be read pass; the reader
+    reports them.
     """
     try:
-        open_regular_file(path).close()
+        with open_regular_file(path) as file:
+            data = file.read(len(LFS_MARK))
+        if is_lfs_pointer(data):
+            action = "read: it is a pointer of Git LFS, and not the file"
+            raise unreadable_error(source, action, LFS_HELP)
     except OSError as error:
         if error.strerror == NOT_REGULAR:
             raise unreadable_error(

@@ -15,7 +15,14 @@ from language.expressions.units import (
     dimension_product,
     parse_unit,
 )
-from language.model.system import ALL_FILES, ColumnMapping, RecordingMap, TextFormat, Window
+from language.model.system import (
+    ALL_FILES,
+    CanDatabase,
+    ColumnMapping,
+    RecordingMap,
+    TextFormat,
+    Window,
+)
 from language.overlays.expand_document import Project, expand_document
 from language.readers.base_reader import Reader
 from language.text.diagnostic import Problems, Span
@@ -134,7 +141,20 @@ class _MapReader(Reader):
             units=units,
         )
 
-    def _read_databases(self, node: YamlNode | None) -> tuple[ScalarNode, ...]:
+    def _read_databases(self, node: YamlNode | None) -> tuple[CanDatabase, ...]:
+        """Return the DBC files: one, a list, or one or a list for each bus."""
+        if isinstance(node, MappingNode):
+            for entry in node:
+                if not entry.key.strip():
+                    self.problems.error("form", entry.span, "the name of a bus is empty")
+            return tuple(
+                CanDatabase(file, entry.key)
+                for entry in node
+                for file in self._files_of(entry.node)
+            )
+        return tuple(CanDatabase(file) for file in self._files_of(node))
+
+    def _files_of(self, node: YamlNode | None) -> tuple[ScalarNode, ...]:
         """Return the names of DBC files: a single one or a list."""
         names = (node,) if isinstance(node, ScalarNode) else tuple(self.read_list(node, "dbc"))
         for name in names:

@@ -258,12 +258,20 @@ ALL_FILES = ""
 
 
 @dataclass(frozen=True)
+class CanDatabase:
+    """The name of a DBC file, and of the bus that it describes; empty for each bus of a log."""
+
+    file: ScalarNode
+    bus: str = ""
+
+
+@dataclass(frozen=True)
 class RecordingMap:
     """The assignment of the columns of a recording to signals.
 
     `windows` are the time intervals to use, by file name or `ALL_FILES`; without any, the whole
     recording is used. `time` is empty if the files carry time stamps themselves. `databases` are
-    the names of DBC files. `date_order` is the order of dates in the time columns (`DMY`, `MDY`);
+    DBC files. `date_order` is the order of dates in the time columns (`DMY`, `MDY`);
     empty if it follows from the dates.
     """
 
@@ -274,7 +282,7 @@ class RecordingMap:
     constants: Mapping[str, tuple[Fraction, Dimension]]
     span: Span
     windows: Mapping[str, tuple[Window, ...]] = field(default_factory=dict)
-    databases: tuple[ScalarNode, ...] = ()
+    databases: tuple[CanDatabase, ...] = ()
     text_format: TextFormat = TextFormat()
     date_order: str = ""
 

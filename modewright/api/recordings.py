@@ -19,7 +19,12 @@ from diagnosis.data_quality.recording_check import (
     check_recordings as run_checks,
     used_columns,
 )
-from diagnosis.data_quality.recording_map_inference import guess_map, guess_time, unmapped
+from diagnosis.data_quality.recording_map_inference import (
+    guess_map,
+    guess_time,
+    read_database_option,
+    unmapped,
+)
 from diagnosis.data_quality.recording_map_proposal import propose_columns
 from diagnosis.data_quality.recording_map_text import format_map, map_name
 from diagnosis.pipeline.diagnosis_case import Case
@@ -47,7 +52,6 @@ from language.text.arguments import (
     to_texts,
 )
 from language.text.diagnostic import MissingToolError, Problems, Source, Span, SpecError
-from language.text.document import ScalarNode
 from language.text.sanitise import escape_invisible
 from modewright.runtime.back_end_choice import simulate_resolved
 
@@ -159,9 +163,11 @@ def propose_map(
     if title and not NAME_PATTERN.fullmatch(title):
         raise ValueError(f"`{title}` is not a name of a map")
     place = Span(Source(display_path(path)), 1, 1)
-    nodes = tuple(ScalarNode(one, Span(Source("command line"), 1, 1)) for one in named)
+    found = tuple(map(read_database_option, named))
+    if len({bool(one.bus) for one in found}) > 1:
+        raise ValueError("either each database has a bus (`can0=a.dbc`) or none has one")
     problems = Problems()
-    recorded = open_recording(path, unmapped("proposed", place, nodes), problems)
+    recorded = open_recording(path, unmapped("proposed", place, found), problems)
     problems.raise_if_errors()
     time, unit, _ = guess_time(recorded)
     proposal = propose_columns(recorded, automaton, time)
@@ -174,7 +180,7 @@ def propose_map(
     stem = Path(strip_window_suffix(path).name.removesuffix(".gz")).stem
     about = f"proposed for {automaton.name} from the columns of {path.name}; check each line"
     title = title or map_name(stem)
-    return format_map(title, escape_invisible(about), (time, unit), proposal, named)
+    return format_map(title, escape_invisible(about), (time, unit), proposal, found)
 
 
 def _without_map(spec: str, project: Project) -> tuple[Automaton, str]:

@@ -39,7 +39,8 @@ def check(
         str | None, typer.Option("--spec", "-s", help="an automaton, to check units and clocks")
     ] = None,
     databases: Annotated[
-        list[str] | None, typer.Option("--dbc", help="CAN database for logs, if there is no map")
+        list[str] | None,
+        typer.Option("--dbc", help="CAN database for logs, if there is no map; also BUS=FILE"),
     ] = None,
     plot: Plot = None,
     as_json: Json = False,
