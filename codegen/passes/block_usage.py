@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from codegen.passes.definite_assignment import find_unassigned_reads
+from language.ir.definite_assignment import find_unassigned_reads
 from language.ir.ops import Assign, Block, Branch, Loop, Switch
 from language.ir.program import Program
 from language.ir.traversal import (

@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator
 
-from language.ir.ops import Binary, Block, Expr, Item, Loop, Ref, RunBlock, Value
+from language.ir.expression_type import is_whole
+from language.ir.ops import Binary, Block, Loop, RunBlock
 from language.ir.program import Program
 from language.ir.rewrite_ops import direct_expressions, walk_post_order
 from language.ir.traversal import called_blocks, walk_ops
@@ -67,20 +68,8 @@ def _call_sites(block: Block) -> Iterator[str]:
 def _count_float_operations(program: Program, name: str) -> int:
     """Return the number of floating-point operations of a block, without those it runs."""
     return sum(
-        isinstance(part, Binary) and part.operator in ARITHMETIC and not _is_integer(part)
+        isinstance(part, Binary) and part.operator in ARITHMETIC and not is_whole(part)
         for op in walk_ops(program.blocks[name])
         for expr in direct_expressions(op)
         for part in walk_post_order(expr)
     )
-
-
-def _is_integer(expr: Expr) -> bool:
-    """Tell whether an arithmetic expression is one of whole numbers."""
-    match expr:
-        case Binary(_, left, right):
-            return _is_integer(left) or _is_integer(right)
-        case Value(value):
-            return isinstance(value, int)
-        case Ref(_, whole) | Item(_, _, whole):
-            return whole
-    return False

@@ -273,6 +273,11 @@ class Program:
         """The variables of the group `input`, in the order of `variables`."""
         return tuple(v for v in self.variables if v.name.startswith("input."))
 
+    def types(self) -> dict[str, ValueType]:
+        """Return the types of all variables and constants by name; of an array its elements."""
+        variables = {variable.name: variable.type for variable in self.variables}
+        return variables | {constant.name: constant.type for constant in self.constants}
+
     def modes_of(self, region: str) -> tuple[ModeInfo, ...]:
         """Return the modes of a region, the name of one of `regions` or "chart" for the root.
 

@@ -13,12 +13,12 @@ import dataclasses
 from collections import Counter
 from collections.abc import Mapping
 
+from language.ir.expression_type import is_whole
 from language.ir.formula_name import format_formula, formula_name
 from language.ir.ops import Assign, Binary, Block, Call, Expr, Op, Ref, Store
 from language.ir.program import Program, Variable
 from language.ir.rewrite_ops import direct_expressions, map_expressions, map_operands, operands
 from language.ir.traversal import block_writes, called_blocks, reachable_blocks
-from language.lowering.expressions import is_whole
 from language.passes.value_numbering import ValueNumbering
 
 CHEAP_FUNCTIONS = ("real", "whole", "abs")

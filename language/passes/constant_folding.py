@@ -16,6 +16,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Literal
 
+from language.ir.expression_type import is_whole
 from language.ir.formula_name import format_formula, formula_name
 from language.ir.number_type import NumberType
 from language.ir.ops import (
@@ -35,7 +36,6 @@ from language.ir.printer import format_expr
 from language.ir.program import Constant, Program, Variable
 from language.ir.rewrite_ops import map_expressions, map_operands, operands
 from language.ir.traversal import block_writes, expr_names, names_used
-from language.lowering.expressions import is_whole
 from language.numerics.evaluate import Scalar, evaluate
 from language.passes.common_subexpressions import CHEAP_FUNCTIONS, eliminate_common_subexpressions
 
