@@ -48,6 +48,12 @@ A function of a Program takes reals and gives a real.
 """
 
 
+def real_function(count: int) -> Signature:
+    """Return the signature of a function of `count` reals."""
+    parameters: tuple[ParameterType, ...] = ("real",)
+    return Signature(parameters * count)
+
+
 def expression_type(expr: Expr, types: Mapping[str, ValueType]) -> ValueType:
     """Return the type of an expression, which is taken to be well-typed.
 

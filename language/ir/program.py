@@ -26,6 +26,8 @@ from language.ir.root_region import CHART
 
 ENTRY_BLOCKS = ("init", "derive", "step")
 """The blocks at which generated C enters a Program."""
+STEP_INTERFACE = ("work.h", "work.left", "work.merge", "work.elapsed", "work.crossed", "work.event")
+"""The variables that an engine writes before it runs blocks of a step, or reads afterwards."""
 MODE_VARIABLE = "memory.mode"
 """Variable of the chart's mode; a run of a model has its own."""
 LOG_VARIABLE = "memory.log"
@@ -35,6 +37,8 @@ LOG_COUNT_VARIABLE = "memory.count_of_log"
 The array exists if a tick may have several micro-steps; a 0 ends each micro-step.
 """
 ValueType = Literal["real", "truth", "whole"]
+InlineMark = Literal["rarely", "not-inlined"]
+"""Mark of a block that is not inlined in C, with the reason."""
 TICK_UNIT = "tick"
 """Unit of a tunable wait on a calibration page."""
 MAX_TIMER_TICKS = 2**31 - 1
@@ -245,7 +249,7 @@ class Program:
 
     The order of the blocks is the order of printing. A sampled Program is entered at `init` and
     `step`; a continuous one at `init` and `step`, or by the engine at its parts (see
-    language/programs/continuous_program.py).
+    language/programs/continuous_program.py). `inlining` marks blocks for the C generator.
     """
 
     name: str
@@ -267,6 +271,7 @@ class Program:
     regions: tuple[RegionInfo, ...] = ()
     invariants: tuple[InvariantInfo, ...] = ()
     alarms: tuple[Alarm, ...] = ()
+    inlining: Mapping[str, InlineMark] = field(default_factory=dict)
 
     @property
     def inputs(self) -> tuple[Variable, ...]:

@@ -40,6 +40,7 @@ from language.integration.vector_field import (
 from language.ir.ops import Assign, Binary, Block, Expr, Ref, RunBlock, add, integer, multiply
 from language.ir.program import (
     ENTRY_BLOCKS,
+    STEP_INTERFACE,
     Program,
     StabilityLimit,
     TransitionInfo,
@@ -75,7 +76,6 @@ from language.model.automaton import Automaton, Mode, Transition
 from language.programs.engine_blocks import engine_blocks
 from language.programs.major_step import (
     LIVELOCK,
-    STEP_INTERFACE,
     ZENO,
     WaitTimers,
     begin_blocks,
