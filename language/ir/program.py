@@ -26,6 +26,24 @@ from language.ir.root_region import CHART
 
 ENTRY_BLOCKS = ("init", "derive", "step")
 """The blocks at which generated C enters a Program."""
+ENGINE_BLOCKS = (
+    "latch",
+    "start",
+    "equations",
+    "evaluate_guards",
+    "jump",
+    "limit",
+    "flow",
+    "advance_time",
+    "dense",
+    "peek",
+    "record",
+    "invariants",
+)
+"""The blocks that an engine runs one by one.
+
+A Program with varying inputs has no `step`.
+"""
 STEP_INTERFACE = ("work.h", "work.left", "work.merge", "work.elapsed", "work.crossed", "work.event")
 """The variables that an engine writes before it runs blocks of a step, or reads afterwards."""
 MODE_VARIABLE = "memory.mode"

@@ -9,11 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from language.ir.program import ENTRY_BLOCKS
+from language.ir.program import ENGINE_BLOCKS, ENTRY_BLOCKS
 
-ENTRIES = frozenset(
-    (*ENTRY_BLOCKS, "compare_stamps", "dense", "flow", "invariants", "jump", "peek", "start")
-) | frozenset(("equations", "evaluate_guards", "record"))
+ENTRIES = frozenset((*ENTRY_BLOCKS, *ENGINE_BLOCKS, "compare_stamps"))
 """Blocks that back ends run from outside."""
 WORK_ONLY = frozenset({"work"})
 CONTRACTS: Mapping[str, frozenset[str]] = {

@@ -1,8 +1,9 @@
-"""Common-subexpression elimination: a block computes each real expression once.
+"""Common-subexpression elimination: the pass after which a block computes a real expression once.
 
-    a = x * y + 1.0    ->    x_y = x * y
-    b = x * y + 2.0          a = x_y + 1.0
-                             b = x_y + 2.0
+before                      after
+a := ((x * y) + 1.0)        work.x_y := (x * y)
+b := ((x * y) + 2.0)        a := (work.x_y + 1.0)
+                            b := (work.x_y + 2.0)
 
 The values are those of a local value numbering.
 """

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from language.ir.program import Program
-from language.ircheck.check_program import Property
+
+if TYPE_CHECKING:
+    from language.ircheck.check_program import Property
 
 
 @dataclass(frozen=True)
