@@ -37,7 +37,7 @@ from tests.lockstep.random_specs.spec_kinds import random_spec
 
 GOLDEN = Path(__file__).parent / "golden"
 HEATER = ROOT / "tests" / "codegen" / "emit" / "golden" / "heater.yaml"
-SHARE = 2
+SHARE = 4
 """An example lowers a spec."""
 
 
