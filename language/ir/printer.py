@@ -61,8 +61,8 @@ def format_program(program: Program) -> str:
 def serialise_program(program: Program) -> str:
     """Return the complete text of a Program: the canonical text with attribute lines.
 
-    `parse_program` (language/ir/program_parser.py) returns an equal Program. Raises ValueError for
-    a switch without cases, which has no text.
+    `parse_program` (language/ir/program_parser.py) returns an equal Program, if it has no switch
+    without cases: that has no text.
     """
     return "".join(f"{line}\n" for line in _serialised_lines(program))
 

@@ -40,7 +40,7 @@ from language.ircheck.violation import Rule
 from language.loading.load import automaton_of, lower_automaton, program_of
 from language.overlays.expand_document import expand_document, read_document
 from tests.language.ircheck.program_stages import random_program, stages
-from tests.language.spec_builders import ROOT, SHIPPED, load_shipped
+from tests.language.spec_builders import ROOT, SHIPPED, automaton, load_shipped
 
 AUTOMATA = [
     path.relative_to(ROOT).as_posix()
@@ -80,6 +80,23 @@ def test_a_program_with_inputs_that_vary_inside_a_step_is_valid() -> None:
     made = load_shipped("bmw_i3")
     for program in (lower_automaton(made, made.inputs), program_of(made, made.inputs)):
         assert check_program(program) == ()
+
+
+REGION_WITHOUT_TRANSITIONS = """language: 1
+automaton: idle
+about: a region that never changes its mode
+states: {x: {unit: m, initial: 0 m}}
+flow: {x: der(x) = 1 m/s}
+modes: {only: {transitions: {other: {when: x > 1 m}}}, other: {}}
+regions: {side: {initial: alone, modes: {alone: {}}}}
+initial: only
+step: 10 ms
+outputs: [x]
+"""
+
+
+def test_a_region_without_transitions_is_valid_after_every_pass() -> None:
+    require_valid_stages(lower_automaton(automaton(REGION_WITHOUT_TRANSITIONS)))
 
 
 # What is corrupted is found.
