@@ -10,6 +10,11 @@ A variable is called `group.name`. The group gives its meaning and its storage:
     latched   input of this tick, saturated to its range
     check     truth of an invariant, for the engine only
     memory    mode, fired transition, counters and other retained variables
+    timer     counter or remaining time of a wait
+    axis      points of an axis of a table
+    innovation  measurement minus its prediction, of an observer
+    is_new    whether a measurement is new in this tick
+    signal    value that a connection of a system reads
     work      local variable of one call
 """
 

@@ -77,9 +77,27 @@ def parse_program(text: str) -> Program:
     given, own = text.splitlines(), serialise_program(program).splitlines()
     for number, (line, printed) in enumerate(itertools.zip_longest(given, own), start=1):
         if line != printed:
-            message = f"`{line}` does not agree with the rest, which gives `{printed}`"
-            raise ProgramSyntaxError(number, message)
+            raise ProgramSyntaxError(number, _format_difference(line or "", printed or ""))
     return program
+
+
+def _format_difference(given: str, own: str) -> str:
+    """Return how a line differs from the line that its Program has.
+
+    Of attributes it names the first that differs, of a list the elements that are too many or
+    missing.
+    """
+    lines = given.strip(), own.strip()
+    if not all(line.startswith(ATTRIBUTE_MARK) for line in lines):
+        return f"`{lines[0]}` does not agree with the rest, which gives `{lines[1]}`"
+    said, real = (json.loads(line.removeprefix(ATTRIBUTE_MARK)) for line in lines)
+    name = next((key for key in (*said, *real) if said.get(key) != real.get(key)), "")
+    one, other = said.get(name), real.get(name)
+    if isinstance(one, list) and isinstance(other, list):
+        surplus = [part for part in one if part not in other]
+        missing = [part for part in other if part not in one]
+        return f"`{name}` does not agree with the rest: too many {surplus}, missing {missing}"
+    return f"`{name}` does not agree with the rest: it is {one!r}, not {other!r}"
 
 
 def _lines_of(text: str) -> Iterator[_Line]:

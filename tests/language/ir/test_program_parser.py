@@ -146,8 +146,8 @@ def replaced(old: str, new: str) -> str:
         ("    run latch", "        run latch", "the line is indented too far"),
         ('@ {"kind"', "@ {kind", "no JSON"),
         ('"kind": "fixed"', '"sort": "fixed"', "wrong attributes"),
-        ('"writes": ["', '"writes": ["memory.wrong", "', "does not agree with the rest"),
-        ('"reads": ["', '"reads": ["memory.wrong", "', "does not agree with the rest"),
+        ('"writes": ["', '"writes": ["memory.wrong", "', "too many ..memory.wrong.., missing"),
+        ('"reads": ["', '"reads": ["memory.wrong", "', "`reads` does not agree with the rest"),
     ],
 )
 def test_a_wrong_text_is_refused_with_its_line(old: str, new: str, message: str) -> None:
