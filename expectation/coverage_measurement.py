@@ -20,7 +20,7 @@ from language.ir.program import Program
 from language.ir.root_region import CHART
 from language.loading.load import lower_automaton
 from language.model.automaton import Automaton
-from language.passes.constant_folding import run_passes
+from language.passes.pass_list import run_passes
 
 STRUCTURE_KEYS = ("modes", "regions", "transitions")
 """The words of a key path that are not names."""

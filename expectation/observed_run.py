@@ -22,9 +22,10 @@ from expectation.name_resolution import (
     mode_signals,
     path_of_mode,
 )
+from language.ir.expression_type import is_whole
 from language.ir.ops import Expr, Ref, Value
 from language.loading.mode_entry_event import ModeEntryEvent
-from language.lowering.expressions import is_whole, lower_assigned_value, lower_expression
+from language.lowering.expressions import lower_assigned_value, lower_expression
 from language.model.system import System
 from language.numerics.evaluate import evaluate
 from language.readers.mode_reader import IMPLICIT_MODE

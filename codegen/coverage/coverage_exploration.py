@@ -24,10 +24,10 @@ from codegen.coverage.libfuzzer import (
     format_word_table,
     word_table,
 )
-from codegen.emit.c_module import restrict_to_step
 from codegen.emit.c_names import SOLVED_PREFIX_ON_PAGE, CNames, c_type
 from codegen.harness.harness import HarnessMain, tick_inputs, write_harness
 from codegen.harness.sanitizers import APP, run_sanitised
+from codegen.passes.step_restriction import restrict_to_step
 from codegen.toolchain.compiler import FLAGS, BuildError
 from codegen.toolchain.external_tools import output_of
 from language.ir.program import Constant, Program

@@ -16,8 +16,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from codegen.coverage.coverage_exploration import write_explorer
-from codegen.emit.c_module import STATIC_PATTERN, run_c_passes
+from codegen.emit.c_module import STATIC_PATTERN
 from codegen.harness.harness import write_harness
+from codegen.passes.pass_list import run_c_passes
 from codegen.proofs.infeasible.float_terms import Range
 from codegen.proofs.infeasible.infeasible_conditions import (
     DecisionSite,

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -29,19 +28,15 @@ from codegen.emit.c_struct import ECU_PAGE, HOST_PAGE, PageLayout, member_of, st
 from codegen.emit.function_comments import describe_function
 from codegen.emit.work_variables import STEP, Scratch, adjust_usages, scratch_of
 from codegen.passes.block_usage import Usage, block_usages, locals_of, loop_locals
-from codegen.passes.dead_stores import remove_dead_stores
-from codegen.passes.fast_path import EVENT_PATH, FastPathMode, add_fast_path
-from codegen.passes.inline_policy import select_noinline_blocks
-from codegen.passes.range_check_merging import LATCH_EACH, merge_range_checks
+from codegen.passes.fast_path import FastPathMode
+from codegen.passes.pass_list import run_c_passes
 from codegen.toolchain.templates import product_version, render
 from language.ir.ops import FaultBit
 from language.ir.printer import digest
-from language.ir.program import ENTRY_BLOCKS, Program, Variable
+from language.ir.program import ENTRY_BLOCKS, InlineMark, Program, Variable
 from language.ir.rewrite_ops import direct_expressions, walk_post_order
 from language.ir.traversal import called_blocks, names_used, walk_ops
 from language.lowering.calibration_stamp import STALE_CALIBRATION
-from language.lowering.invariants import INVARIANT_PREFIX, INVARIANTS
-from language.lowering.program_builder import finalise_program
 from language.model.declaration import MICRO_STEP_LIMIT_FAULT
 from language.model.graph_algorithms import post_order
 from language.numerics.function_table import FUNCTIONS_BY_TYPE
@@ -82,9 +77,8 @@ def fault_reason(program: Program, fault: str) -> str:
     return RANGE_REASON.format(" or ".join(names)) if names else ""
 
 
-COLD_BLOCKS = (LATCH_EACH, EVENT_PATH, "rollback_")
-"""Prefixes of blocks that run rarely and are not inlined."""
-
+INLINE_KEYWORDS: Mapping[InlineMark, str] = {"rarely": "RARELY", "not-inlined": "NOT_INLINED"}
+"""The keyword of a function with a mark (rule C23); a function without one is `inline`."""
 NOT_INLINED = {
     "RARELY": "Runs rarely: not inlined",
     "NOT_INLINED": "Computes much: its values are on the stack only while it runs",
@@ -125,33 +119,6 @@ def emit_c_files(
     if context["uses_page_tables"]:
         files.update(emit_page_header(program.number_type))
     return files
-
-
-def run_c_passes(
-    program: Program, by_magnitude: bool = True, fast_path: FastPathMode = "on"
-) -> Program:
-    """Return the Program that is printed as C, after the passes of the C generator (rule C18).
-
-    The passes are, in this order, `restrict_to_step`, `remove_dead_stores` (of `work.` variables),
-    `merge_range_checks` and `add_fast_path`. They keep the bits of all results.
-    """
-    return add_fast_path(
-        merge_range_checks(remove_dead_stores(restrict_to_step(program), ("work.",)), by_magnitude),
-        fast_path,
-    )
-
-
-def restrict_to_step(program: Program) -> Program:
-    """Return a Program without what its C does not execute.
-
-    A continuous Program (`period` is None) keeps what the blocks of ENTRY_BLOCKS reach. A sampled
-    Program loses only the block and the variables of its invariants (rule 11b).
-    """
-    if program.period is None:
-        return finalise_program(program, ENTRY_BLOCKS)
-    blocks = {name: block for name, block in program.blocks.items() if name != INVARIANTS}
-    variables = tuple(v for v in program.variables if not v.name.startswith(INVARIANT_PREFIX))
-    return dataclasses.replace(program, blocks=blocks, variables=variables)
 
 
 def module_context(program: Program, page_layout: PageLayout = HOST_PAGE) -> dict[str, Any]:
@@ -320,12 +287,12 @@ def _emit_functions(
     scratch: Scratch | None,
 ) -> list[dict[str, Any]]:
     """Return the template contexts of all functions, callees first."""
-    noinline = select_noinline_blocks(program)
     modes, run_modes = ([m.name for m in of] for of in (program.modes, program.run_modes))
     functions = []
     calls = {name: called_blocks(block) for name, block in program.blocks.items()}
     for name in post_order(calls):
-        keyword = _inline_keyword(name, noinline)
+        mark = program.inlining.get(name)
+        keyword = INLINE_KEYWORDS[mark] if mark else "inline"
         function = _emit_function(
             program,
             name,
@@ -379,13 +346,6 @@ def _emit_function(
             *(_redirect_derived(name, line) for line in writer.emit_block(program.blocks[name])),
         ],
     }
-
-
-def _inline_keyword(name: str, noinline: frozenset[str]) -> str:
-    """Return the keyword of a function: `RARELY`, `NOT_INLINED` or `inline` (rule C23)."""
-    if name.startswith(COLD_BLOCKS):
-        return "RARELY"
-    return "NOT_INLINED" if name in noinline else "inline"
 
 
 def _format_parameters(opening: str, parameters: Sequence[str]) -> str:

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from codegen.passes.block_usage import Usage
-from codegen.passes.definite_assignment import find_unassigned_reads
+from language.ir.definite_assignment import find_unassigned_reads
 from language.ir.ops import Loop
 from language.ir.program import Program, Variable
 from language.ir.traversal import called_blocks, names_used, reachable_blocks, walk_ops

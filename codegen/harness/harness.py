@@ -8,8 +8,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from codegen.emit.c_module import emit_c_files, restrict_to_step
+from codegen.emit.c_module import emit_c_files
 from codegen.emit.c_names import C_REAL_TYPE, CNames, c_member, c_type
+from codegen.passes.step_restriction import restrict_to_step
 from codegen.toolchain.build_cache import get_or_build, key_of
 from codegen.toolchain.compiler import FLAGS, WARNINGS, compiler_version, run_compiler
 from codegen.toolchain.object_cache import substitute_objects

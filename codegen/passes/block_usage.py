@@ -9,9 +9,9 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from codegen.passes.definite_assignment import find_unassigned_reads
+from language.ir.definite_assignment import find_unassigned_reads
 from language.ir.ops import Assign, Block, Branch, Loop, Switch
-from language.ir.program import Program
+from language.ir.program import STEP_INTERFACE, Program
 from language.ir.traversal import (
     block_reads,
     block_writes,
@@ -20,7 +20,6 @@ from language.ir.traversal import (
     walk_ops,
 )
 from language.model.graph_algorithms import post_order
-from language.programs.major_step import STEP_INTERFACE
 
 POINTER_OF_GROUP = {
     "input": "in",

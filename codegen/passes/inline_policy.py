@@ -1,4 +1,9 @@
-"""Inline policy: selects the functions of C that are not inlined, to limit the stack (rule C23).
+"""Inline policy: the pass that marks the blocks that are not inlined in C (rule C23).
+
+before                      after
+block latch_each            block latch_each (rarely)
+block rates_gap             block rates_gap (not-inlined)
+block jump_gap              block jump_gap
 
 Where an ECU computes in software, the intermediate values of a function are on the stack. A
 compiler inlines functions that are called once, and the frame of the merged function is allocated
@@ -7,11 +12,15 @@ as long as any part of it runs.
 
 from __future__ import annotations
 
+import dataclasses
 from collections import defaultdict
 from collections.abc import Iterator
 
-from language.ir.ops import Binary, Block, Expr, Item, Loop, Ref, RunBlock, Value
-from language.ir.program import Program
+from codegen.passes.fast_path import EVENT_PATH
+from codegen.passes.range_check_merging import LATCH_EACH
+from language.ir.expression_type import is_whole
+from language.ir.ops import Binary, Block, Loop, RunBlock
+from language.ir.program import InlineMark, Program
 from language.ir.rewrite_ops import direct_expressions, walk_post_order
 from language.ir.traversal import called_blocks, walk_ops
 
@@ -27,6 +36,26 @@ NOINLINE_WITH_COVARIANCE = frozenset({"latch"})
 """Blocks that are not inlined if one of ALWAYS_NOINLINE exists. The comparison of inputs with their
 ranges is computed in software too. Inlined into the step, its saved registers would add to the
 stack below a covariance (decision 0026)."""
+
+
+COLD_BLOCKS = (LATCH_EACH, EVENT_PATH, "rollback_")
+"""Prefixes of blocks that run rarely and are not inlined."""
+
+
+def mark_inlining(program: Program) -> Program:
+    """Return a Program whose blocks that are not inlined are marked in `inlining` (rule C23).
+
+    The mark is `rarely` for blocks of COLD_BLOCKS, and `not-inlined` for those that
+    `select_noinline_blocks` returns.
+    """
+    marks: dict[str, InlineMark] = {}
+    noinline = select_noinline_blocks(program)
+    for name in program.blocks:
+        if name.startswith(COLD_BLOCKS):
+            marks[name] = "rarely"
+        elif name in noinline:
+            marks[name] = "not-inlined"
+    return dataclasses.replace(program, inlining=marks)
 
 
 def select_noinline_blocks(program: Program) -> frozenset[str]:
@@ -67,20 +96,8 @@ def _call_sites(block: Block) -> Iterator[str]:
 def _count_float_operations(program: Program, name: str) -> int:
     """Return the number of floating-point operations of a block, without those it runs."""
     return sum(
-        isinstance(part, Binary) and part.operator in ARITHMETIC and not _is_integer(part)
+        isinstance(part, Binary) and part.operator in ARITHMETIC and not is_whole(part)
         for op in walk_ops(program.blocks[name])
         for expr in direct_expressions(op)
         for part in walk_post_order(expr)
     )
-
-
-def _is_integer(expr: Expr) -> bool:
-    """Tell whether an arithmetic expression is one of whole numbers."""
-    match expr:
-        case Binary(_, left, right):
-            return _is_integer(left) or _is_integer(right)
-        case Value(value):
-            return isinstance(value, int)
-        case Ref(_, whole) | Item(_, _, whole):
-            return whole
-    return False

@@ -17,10 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.emit.c_module import emit_c_files, restrict_to_step
+from codegen.emit.c_module import emit_c_files
 from codegen.emit.c_names import c_member, c_type
 from codegen.harness.harness import tunable_constants
 from codegen.passes.dead_stores import remove_dead_stores
+from codegen.passes.step_restriction import restrict_to_step
 from codegen.predictor.kalman_gains import MAX_SAMPLES, compute_kalman_gains
 from codegen.predictor.predictor_arrays import (
     Prediction,

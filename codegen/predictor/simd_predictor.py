@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from codegen.emit.c_expression import LIBM_FUNCTIONS
-from codegen.emit.c_module import module_context, restrict_to_step, run_c_passes
+from codegen.emit.c_module import module_context
 from codegen.emit.c_names import CNames, c_member
 from codegen.emit.c_statement import emit_wrapped_statement
 from codegen.emit.c_struct import ECU_PAGE as MODULE_PAGE
@@ -26,6 +26,8 @@ from codegen.passes.fast_path import (
     add_fast_path,
     mode_configurations,
 )
+from codegen.passes.pass_list import run_c_passes
+from codegen.passes.step_restriction import restrict_to_step
 from codegen.simulator.simd_batch import (
     LANES,
     LaneKind,

@@ -11,9 +11,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from codegen.emit.c_expression import format_literal
-from codegen.emit.c_module import emit_c_files, restrict_to_step
+from codegen.emit.c_module import emit_c_files
 from codegen.emit.c_names import C_REAL_TYPE, CNames, c_type
 from codegen.harness.harness import tick_inputs, tunable_constants
+from codegen.passes.step_restriction import restrict_to_step
 from codegen.toolchain.external_tools import run_tool
 from codegen.toolchain.templates import render
 from codegen.toolchain.tool_verdict import ToolVerdict, tool_version

@@ -16,6 +16,7 @@ from codegen.emit.c_math import emit_math_files
 from codegen.emit.c_module import module_context
 from codegen.emit.c_names import CNames, c_type
 from codegen.passes.block_usage import block_usages, locals_of
+from codegen.passes.inline_policy import mark_inlining
 from codegen.passes.range_violation_flags import (
     RANGE_VIOLATION_FLAG,
     add_range_violation_flags as marked_program,
@@ -180,7 +181,7 @@ def _load_stepper(stepper_key: _StepperKey, flags: tuple[str, ...]) -> LoadedSte
 
 def _emit_files(program: Program) -> tuple[dict[str, str], dict[str, int], dict[str, str]]:
     """Return the C files of a Program, the numbers of blocks, and the C types of variables."""
-    context = module_context(program)
+    context = module_context(mark_inlining(program))
     local = locals_of(program)
     usage_by_block, c_names = block_usages(program, local), CNames(program)
     hidden = {name for names in local.values() for name in names}

@@ -9,6 +9,7 @@ from codegen.emit.c_expression import format_literal
 from codegen.emit.c_module import module_context
 from codegen.emit.c_names import CNames, c_member
 from codegen.passes.block_usage import block_usages, locals_of
+from codegen.passes.inline_policy import mark_inlining
 from codegen.passes.range_violation_flags import RANGE_VIOLATION_FLAG, ranged_signals
 from codegen.simulator.signal_names import INSTANCE_NAME, SignalNameMap, row_width
 from codegen.simulator.simd_batch import simd_batch_context
@@ -43,7 +44,7 @@ def simulator_module_context(
     slots = _row_slots(assembly, name, program)
     number = assembly.first_event_numbers()[name]
     return {
-        **module_context(program),
+        **module_context(mark_inlining(program)),
         "digest": "",
         "title": f"Instance {name}",
         "is_flow": is_flow,

@@ -14,6 +14,7 @@ from typing import Any, Literal
 from codegen.emit.c_expression import LIBM_FUNCTIONS, format_literal
 from codegen.emit.c_names import CNames
 from codegen.emit.c_statement import emit_wrapped_statement
+from language.ir.expression_type import expression_type
 from language.ir.ops import (
     Assign,
     Binary,
@@ -22,6 +23,7 @@ from language.ir.ops import (
     Call,
     Compare,
     Expr,
+    Item,
     Op,
     Ref,
     RunBlock,
@@ -30,7 +32,8 @@ from language.ir.ops import (
     Unary,
     Value,
 )
-from language.ir.program import MODE_VARIABLE, Program
+from language.ir.program import MODE_VARIABLE, Program, ValueType
+from language.ir.traversal import subexpressions
 from language.programs.system_program import range_event_variables
 
 LANES = 4
@@ -105,26 +108,30 @@ class VectorEmitter:
     def kind_of(self, expr: Expr) -> LaneKind:
         """Return the kind of an expression.
 
-        It is "truth" for logic and comparisons, else that of its operands. Of a choice the `then`
-        value decides; a call is "real". Raises NotVectorisable for whole numbers, unknown names,
-        elements of tables, the functions `real` and `whole`, and calls with a truth value.
+        It is the type of the expression (`expression_type`). Raises NotVectorisable for whole
+        numbers, unknown names, elements of tables, the functions `real` and `whole`, and calls with
+        a truth value.
         """
-        match expr:
-            case Value(value) if isinstance(value, bool):
-                return "truth"
-            case Value(value) if isinstance(value, float):
-                return "real"
-            case Ref(name) if name in self.named_values:
-                return self.named_values[name][1]
-            case Ref(name) if name in self.kinds:
-                return self.kinds[name]
-            case Unary("not", _) | Binary("and" | "or", _, _) | Compare():
-                return "truth"
-            case Unary("-", operand) | Binary(_, operand, _) | Select(_, operand, _):
-                return self.kind_of(operand)
-            case Call(function, arguments) if function not in ("real", "whole"):
-                if all(self.kind_of(argument) == "real" for argument in arguments):
-                    return "real"
+        parts = subexpressions(expr)
+        types: dict[str, ValueType] = {
+            part.name: self._kind_of_name(part.name) for part in parts if isinstance(part, Ref)
+        }
+        for part in parts:
+            if isinstance(part, Item) or expression_type(part, types) == "whole":
+                raise NotVectorisable
+            if isinstance(part, Call) and (
+                part.function == "real"
+                or any(expression_type(argument, types) != "real" for argument in part.arguments)
+            ):
+                raise NotVectorisable
+        return "truth" if expression_type(expr, types) == "truth" else "real"
+
+    def _kind_of_name(self, name: str) -> LaneKind:
+        """Return the kind of a name. Raises NotVectorisable for an unknown one."""
+        if name in self.named_values:
+            return self.named_values[name][1]
+        if name in self.kinds:
+            return self.kinds[name]
         raise NotVectorisable
 
     def emit_expression(self, expr: Expr) -> str:

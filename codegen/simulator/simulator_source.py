@@ -32,12 +32,10 @@ from codegen.simulator.signal_names import (
 from codegen.simulator.simd_batch import LANES
 from codegen.toolchain.templates import product_version, render
 from language.ir.number_type import NumberType
-from language.ir.program import Program, unqualified_name
+from language.ir.program import ENGINE_BLOCKS, STEP_INTERFACE, Program, unqualified_name
 from language.ir.traversal import names_used
 from language.lowering.program_builder import finalise_program
 from language.model.system import Sensor
-from language.programs.continuous_program import ENGINE_BLOCKS
-from language.programs.major_step import STEP_INTERFACE
 from language.programs.system_program import (
     InputSource,
     InputTrajectory,

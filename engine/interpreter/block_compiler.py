@@ -79,9 +79,7 @@ class BlockCompiler:
         for function in sorted(program.functions, key=lambda f: _call_depth(f, program.functions)):
             if function.name not in self.functions:
                 self.functions[function.name] = self._compile_function(function)
-        reals = [v.name for v in program.variables if v.type == "real"]
-        reals += [c.name for c in program.constants if c.type == "real"]
-        self.reals = frozenset(reals)
+        self.reals = frozenset(name for name, kind in program.types().items() if kind == "real")
         self._done: dict[str, StatementClosure] = {}
         self.blocks = {name: self._compile_named_block(name) for name in program.blocks}
 

@@ -11,6 +11,9 @@ from typing import Literal
 
 from language.ir.number_type import NumberType, round_to_type
 
+BinaryOperator = Literal["+", "-", "*", "/", "and", "or"]
+Relation = Literal["<", "<=", ">", ">=", "==", "!="]
+
 
 @dataclass(frozen=True, slots=True)
 class Value:
@@ -62,7 +65,7 @@ class Binary:
     Both sides are evaluated.
     """
 
-    operator: Literal["+", "-", "*", "/", "and", "or"]
+    operator: BinaryOperator
     left: Expr
     right: Expr
 
@@ -71,7 +74,7 @@ class Binary:
 class Compare:
     """A relation of two values; with a NaN it is false, except for `!=`."""
 
-    operator: Literal["<", "<=", ">", ">=", "==", "!="]
+    operator: Relation
     left: Expr
     right: Expr
 

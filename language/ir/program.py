@@ -10,6 +10,11 @@ A variable is called `group.name`. The group gives its meaning and its storage:
     latched   input of this tick, saturated to its range
     check     truth of an invariant, for the engine only
     memory    mode, fired transition, counters and other retained variables
+    timer     counter or remaining time of a wait
+    axis      points of an axis of a table
+    innovation  measurement minus its prediction, of an observer
+    is_new    whether a measurement is new in this tick
+    signal    value that a connection of a system reads
     work      local variable of one call
 """
 
@@ -26,6 +31,26 @@ from language.ir.root_region import CHART
 
 ENTRY_BLOCKS = ("init", "derive", "step")
 """The blocks at which generated C enters a Program."""
+ENGINE_BLOCKS = (
+    "latch",
+    "start",
+    "equations",
+    "evaluate_guards",
+    "jump",
+    "limit",
+    "flow",
+    "advance_time",
+    "dense",
+    "peek",
+    "record",
+    "invariants",
+)
+"""The blocks that an engine runs one by one.
+
+A Program with varying inputs has no `step`.
+"""
+STEP_INTERFACE = ("work.h", "work.left", "work.merge", "work.elapsed", "work.crossed", "work.event")
+"""The variables that an engine writes before it runs blocks of a step, or reads afterwards."""
 MODE_VARIABLE = "memory.mode"
 """Variable of the chart's mode; a run of a model has its own."""
 LOG_VARIABLE = "memory.log"
@@ -35,6 +60,8 @@ LOG_COUNT_VARIABLE = "memory.count_of_log"
 The array exists if a tick may have several micro-steps; a 0 ends each micro-step.
 """
 ValueType = Literal["real", "truth", "whole"]
+InlineMark = Literal["rarely", "not-inlined"]
+"""Mark of a block that is not inlined in C, with the reason."""
 TICK_UNIT = "tick"
 """Unit of a tunable wait on a calibration page."""
 MAX_TIMER_TICKS = 2**31 - 1
@@ -245,7 +272,7 @@ class Program:
 
     The order of the blocks is the order of printing. A sampled Program is entered at `init` and
     `step`; a continuous one at `init` and `step`, or by the engine at its parts (see
-    language/programs/continuous_program.py).
+    language/programs/continuous_program.py). `inlining` marks blocks for the C generator.
     """
 
     name: str
@@ -267,11 +294,17 @@ class Program:
     regions: tuple[RegionInfo, ...] = ()
     invariants: tuple[InvariantInfo, ...] = ()
     alarms: tuple[Alarm, ...] = ()
+    inlining: Mapping[str, InlineMark] = field(default_factory=dict)
 
     @property
     def inputs(self) -> tuple[Variable, ...]:
         """The variables of the group `input`, in the order of `variables`."""
         return tuple(v for v in self.variables if v.name.startswith("input."))
+
+    def types(self) -> dict[str, ValueType]:
+        """Return the types of all variables and constants by name; of an array its elements."""
+        variables = {variable.name: variable.type for variable in self.variables}
+        return variables | {constant.name: constant.type for constant in self.constants}
 
     def modes_of(self, region: str) -> tuple[ModeInfo, ...]:
         """Return the modes of a region, the name of one of `regions` or "chart" for the root.

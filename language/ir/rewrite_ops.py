@@ -86,6 +86,29 @@ def map_expressions(block: Block, transform: ExprTransform) -> Block:
     return tuple(_map_op(op, transform) for op in block)
 
 
+def remove_empty_switches(block: Block) -> Block:
+    """Return a block without switches that have no cases, also inside other operations.
+
+    when x is <nothing>    ->    <no operation>
+    """
+    ops: list[Op] = []
+    for op in block:
+        match op:
+            case Switch(_, ()):
+                pass
+            case Switch(selector, cases):
+                inner = tuple((number, remove_empty_switches(case)) for number, case in cases)
+                ops.append(Switch(selector, inner))
+            case Branch(condition, then, other):
+                arms = remove_empty_switches(then), remove_empty_switches(other)
+                ops.append(Branch(condition, *arms))
+            case Loop(count, index, body):
+                ops.append(Loop(count, index, remove_empty_switches(body)))
+            case _:
+                ops.append(op)
+    return tuple(ops)
+
+
 def direct_expressions(op: Op) -> tuple[Expr, ...]:
     """Return the expressions that an operation reads itself, without those of its inner blocks.
 

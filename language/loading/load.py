@@ -12,7 +12,7 @@ from language.ir.program import Program
 from language.loading.automaton_reader import read_automaton
 from language.model.automaton import Automaton
 from language.overlays.expand_document import Project
-from language.passes.constant_folding import run_passes
+from language.passes.pass_list import run_passes
 from language.programs.continuous_program import lower_continuous_automaton
 from language.programs.sampled_program import lower_sampled_automaton
 from language.text.diagnostic import Problems, Source, Span

@@ -28,6 +28,7 @@ from language.expressions.syntax_tree import (
     names,
 )
 from language.ir.analysis_cache import cache_on_owner
+from language.ir.expression_type import is_whole
 from language.ir.ops import (
     Assign,
     Binary,
@@ -35,7 +36,6 @@ from language.ir.ops import (
     Call,
     Compare,
     Expr,
-    Item,
     Op,
     Ref,
     Select,
@@ -165,29 +165,6 @@ def lower_assigned_value(tree: SyntaxTree, known: NameBindings, whole: bool) -> 
 def to_real(expr: Expr) -> Expr:
     """Return the call `real` of a whole-number expression; other expressions are unchanged."""
     return Call("real", (expr,)) if is_whole(expr) else expr
-
-
-def is_whole(expr: Expr) -> bool:
-    """Return whether the value of an expression is a whole number; values of enumerations are.
-
-    It follows from the operands of `+`, `-`, `*` and of a selection (then-branch); a division is
-    real, and of calls only `whole` is a whole number.
-    """
-    match expr:
-        case Ref(_, whole) | Item(_, _, whole):
-            return whole
-        case Value(value):
-            return type(value) is int
-        case Unary("-", operand):
-            return is_whole(operand)
-        case Binary(operator, left, _):
-            return operator in "+-*" and is_whole(left)
-        case Select(_, then, _):
-            return is_whole(then)
-        case Call(function, _):
-            return function == "whole"
-        case _:
-            return False
 
 
 def _lower_real(tree: SyntaxTree, known: NameBindings) -> Expr:

@@ -9,6 +9,7 @@ import dataclasses
 from collections.abc import Iterable, Mapping
 
 from language.expressions.units import Dimension
+from language.ir.annotate_types import annotate_types
 from language.ir.number_type import NumberType, round_to_type
 from language.ir.ops import Assign, Binary, Block, Compare, Expr, Op, Ref, integer
 from language.ir.program import (
@@ -25,6 +26,7 @@ from language.ir.program import (
     mode_variable,
     value_type,
 )
+from language.ir.rewrite_ops import remove_empty_switches
 from language.ir.root_region import CHART
 from language.ir.round_literals import round_program
 from language.ir.traversal import block_names, names_used, reachable_blocks
@@ -281,14 +283,19 @@ def finalise_program(
 ) -> Program:
     """Return the Program with only the blocks that are reachable from its entry blocks.
 
-    Entries that do not exist are ignored. Constants and variables that no block, output or `keep`
-    names are removed, except inputs and the `is_new` flags; tunables that solved constants depend
-    on stay. The elementary functions that are called are added. Literals are rounded to the number
-    type. `retain_inputs` keeps only inputs that another block reads.
+    Entries that do not exist are ignored. Switches without cases are removed. Constants and
+    variables that no block, output or `keep` names are removed, except inputs and the `is_new`
+    flags; tunables that solved constants depend on stay. The elementary functions that are called
+    are added. Literals are rounded to the number type, and references get the types of their
+    declarations. `retain_inputs` keeps only inputs that another block reads.
     """
     runs = (reachable_blocks(entry, program.blocks) for entry in entries if entry in program.blocks)
     reached = set[str]().union(*runs)
-    blocks = {name: block for name, block in program.blocks.items() if name in reached}
+    blocks = {
+        name: remove_empty_switches(block)
+        for name, block in program.blocks.items()
+        if name in reached
+    }
     used = names_used(blocks.values())
     used |= {*keep, *(wire.source for wire in program.outputs)}
     constants = [c for c in program.constants if c.name in used]
@@ -302,13 +309,15 @@ def finalise_program(
     interface = ("input.", "is_new.")
     variables = [v for v in program.variables if v.name in used or v.name.startswith(interface)]
     variables = _remove_unused_before(variables, blocks)
-    return round_program(
-        dataclasses.replace(
-            program,
-            constants=tuple(constants),
-            variables=tuple(variables),
-            functions=functions,
-            blocks=blocks,
+    return annotate_types(
+        round_program(
+            dataclasses.replace(
+                program,
+                constants=tuple(constants),
+                variables=tuple(variables),
+                functions=functions,
+                blocks=blocks,
+            )
         )
     )
 

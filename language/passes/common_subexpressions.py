@@ -1,8 +1,9 @@
-"""Common-subexpression elimination: a block computes each real expression once.
+"""Common-subexpression elimination: the pass after which a block computes a real expression once.
 
-    a = x * y + 1.0    ->    x_y = x * y
-    b = x * y + 2.0          a = x_y + 1.0
-                             b = x_y + 2.0
+before                      after
+a := ((x * y) + 1.0)        work.x_y := (x * y)
+b := ((x * y) + 2.0)        a := (work.x_y + 1.0)
+                            b := (work.x_y + 2.0)
 
 The values are those of a local value numbering.
 """
@@ -13,12 +14,12 @@ import dataclasses
 from collections import Counter
 from collections.abc import Mapping
 
+from language.ir.expression_type import is_whole
 from language.ir.formula_name import format_formula, formula_name
 from language.ir.ops import Assign, Binary, Block, Call, Expr, Op, Ref, Store
 from language.ir.program import Program, Variable
 from language.ir.rewrite_ops import direct_expressions, map_expressions, map_operands, operands
 from language.ir.traversal import block_writes, called_blocks, reachable_blocks
-from language.lowering.expressions import is_whole
 from language.passes.value_numbering import ValueNumbering
 
 CHEAP_FUNCTIONS = ("real", "whole", "abs")

@@ -39,7 +39,9 @@ from language.integration.vector_field import (
 )
 from language.ir.ops import Assign, Binary, Block, Expr, Ref, RunBlock, add, integer, multiply
 from language.ir.program import (
+    ENGINE_BLOCKS,
     ENTRY_BLOCKS,
+    STEP_INTERFACE,
     Program,
     StabilityLimit,
     TransitionInfo,
@@ -60,7 +62,7 @@ from language.lowering.continuous_delay import (
 from language.lowering.continuous_edge_detection import edge_bindings, level_variables, reset_levels
 from language.lowering.expressions import NameBindings, lower_equations, variable_bindings
 from language.lowering.guard_variable_names import mode_bindings
-from language.lowering.invariants import INVARIANTS, invariant_blocks, invariant_variables
+from language.lowering.invariants import invariant_blocks, invariant_variables
 from language.lowering.linearisation import LinearisationPoint
 from language.lowering.program_builder import (
     assemble_program,
@@ -75,7 +77,6 @@ from language.model.automaton import Automaton, Mode, Transition
 from language.programs.engine_blocks import engine_blocks
 from language.programs.major_step import (
     LIVELOCK,
-    STEP_INTERFACE,
     ZENO,
     WaitTimers,
     begin_blocks,
@@ -93,25 +94,6 @@ from language.programs.parallel_regions import (
     parallel_blocks,
 )
 from language.text.diagnostic import Problems
-
-ENGINE_BLOCKS = (
-    "latch",
-    "start",
-    "equations",
-    "evaluate_guards",
-    "jump",
-    "limit",
-    "flow",
-    "advance_time",
-    "dense",
-    "peek",
-    "record",
-    INVARIANTS,
-)
-"""The blocks that an engine runs one by one.
-
-A Program with varying inputs has no `step`.
-"""
 
 
 def lower_continuous_automaton(

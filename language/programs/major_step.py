@@ -51,8 +51,6 @@ ZENO = "zeno"
 """The fault bit of a major step with too many events."""
 LIVELOCK = "livelock"
 """The fault bit of a cycle of transitions at one instant."""
-STEP_INTERFACE = ("work.h", "work.left", "work.merge", "work.elapsed", "work.crossed", "work.event")
-"""The variables that an engine writes before it runs these blocks, or reads afterwards."""
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,14 @@
-"""Pass output: print a spec after each pass, and compare two specs."""
+"""Pass output: print a spec after each pass, what a pass changes, and compare two specs."""
 
 from __future__ import annotations
 
 import difflib
+from collections.abc import Mapping
 from typing import Any, Literal, get_args
 
+from codegen.passes.pass_list import C_PASSES
 from language.ir.printer import format_program
+from language.ir.program import Program
 from language.loading.load import automaton_of, command_line_value, lower_automaton, program_of
 from language.loading.system_reader import read_system
 from language.lowering.program_parameters import parameter_kinds
@@ -17,11 +20,12 @@ from language.overlays.expand_document import (
     expand_document,
     read_document,
 )
-from language.passes.constant_folding import PASSES
+from language.passes.pass_list import LANGUAGE_PASSES
+from language.passes.program_pass import ProgramPass, run_each
 from language.programs.solved_numbers_report import format_solved_numbers
 from language.text.arguments import PathText, to_choice, to_project, to_text
 from language.text.diagnostic import Problems, SpecError
-from language.text.document import Document
+from language.text.document import Document, ScalarNode
 from language.text.node_edit import format_inline
 from language.text.provenance import (
     ProvenanceEntry,
@@ -31,23 +35,96 @@ from language.text.provenance import (
     provenance_entries,
 )
 from modewright.api.documents import Values, literals_of
+from modewright.api.ir_check import LOWERED
 from modewright.runtime.json_format import format_entry
 
-PassName = Literal["document", "model", "lowered", "parameters", "inputs", "program", "numbers"]
+PassName = Literal[
+    "document",
+    "model",
+    "lowered",
+    "program",
+    "numbers",
+    "parameters",
+    "inputs",
+    "common-subexpressions",
+    "unused-parameters",
+    "step",
+    "unread-results",
+    "range-checks",
+    "fast-path",
+    "inlining",
+]
+"""Stages whose text is printed, then the passes of the language, then those of the C generator."""
+PROGRAM_PASSES: Mapping[str, ProgramPass] = {
+    step.name: step for step in (*LANGUAGE_PASSES, *C_PASSES)
+}
+"""The passes from Program to Program in their order, by name."""
 
 
 def explain_spec(
     spec: PathText, stage: PassName, values: Values, root: PathText | None = None
 ) -> str:
-    """Return the text of a spec after the pass `stage`.
+    """Return the text of a spec at a stage, or what a pass changes.
 
-    The passes are `document`, `model`, `lowered`, the keys of PASSES in their order, and `numbers`
-    (solved numbers). `values` are parameter values; `document` ignores them. A calibration has the
-    same text for all passes but `document`: one line for each value. Raises SpecError, and
-    ValueError for another pass.
+    The stages are `document`, `model`, `lowered` (the Program before all passes), `program` (the
+    Program of engine and generator) and `numbers` (solved numbers). A key of PROGRAM_PASSES gives
+    the difference of the Program before and after this pass. `values` are parameter values;
+    `document` ignores them. A calibration has the same text for all stages but `document`: one line
+    for each value. Raises SpecError, and ValueError for another stage.
     """
-    project, stage = to_project(root), to_choice(stage, get_args(PassName), "stage")
-    scalars = {name: command_line_value(text) for name, text in literals_of(values).items()}
+    stage = to_choice(stage, get_args(PassName), "stage")
+    if stage in PROGRAM_PASSES and (program := _lowered(spec, values, root)):
+        return _format_pass(program, stage)
+    return _stage_text(spec, stage, values, root)
+
+
+def program_after(
+    spec: PathText, stop_after: str, values: Values, root: PathText | None = None
+) -> str:
+    """Return the text of the Program of an automaton after a pass and all passes before it.
+
+    `stop_after` is a key of PROGRAM_PASSES, or `lowered` for no pass. A calibration has one line
+    for each value. Raises SpecError, and ValueError for another pass.
+    """
+    return _stage_text(
+        spec, to_choice(stop_after, (LOWERED, *PROGRAM_PASSES), "stop_after"), values, root
+    )
+
+
+def _lowered(spec: PathText, values: Values, root: PathText | None) -> Program | None:
+    """Return the Program of an automaton before all passes; None for a calibration."""
+    project = to_project(root)
+    document = read_document(project.path_of(to_text(spec, "spec")))
+    if document.kind == "calibration":
+        return None
+    return lower_automaton(automaton_of(document, project, _scalars_of(values)))
+
+
+def _format_pass(program: Program, name: str) -> str:
+    """Return the summary of a pass and the difference of a Program before and after it."""
+    passes = PROGRAM_PASSES.values()
+    result = next(one for one in run_each(program, passes) if one.step.name == name)
+    before, after = (_pass_lines(one) for one in (result.before, result.after))
+    lines = list(difflib.unified_diff(before, after, "before", "after", lineterm=""))
+    title = f"pass {name}: {result.step.summary}"
+    return "".join(f"{line}\n" for line in (title, *(lines or ["it changes nothing here"])))
+
+
+def _pass_lines(program: Program) -> list[str]:
+    """Return the lines of a Program, with the marks of blocks that are not inlined."""
+    lines = format_program(program).splitlines()
+    marks = {f"block {name}": f" ({mark})" for name, mark in program.inlining.items()}
+    return [line + marks.get(line, "") for line in lines]
+
+
+def _scalars_of(values: Values) -> dict[str, ScalarNode]:
+    """Return parameter values as scalars."""
+    return {name: command_line_value(text) for name, text in literals_of(values).items()}
+
+
+def _stage_text(spec: PathText, stage: str, values: Values, root: PathText | None) -> str:
+    """Return the text of a spec at a stage, or of its Program after a pass."""
+    project, scalars = to_project(root), _scalars_of(values)
     document = read_document(project.path_of(to_text(spec, "spec")))
     if stage == "document":
         return format_spec(_expand_document(document, project).root)
@@ -58,14 +135,13 @@ def explain_spec(
         return format_model(automaton)
     if stage == "numbers":
         return format_solved_numbers(program_of(automaton))
+    if stage == "program":
+        return format_program(program_of(automaton))
     program = lower_automaton(automaton)
-    for name, run in PASSES.items():
-        if stage == "lowered":
-            break
-        program = run(program)
-        if stage == name:
-            break
-    return format_program(program)
+    if stage != LOWERED:
+        results = run_each(program, PROGRAM_PASSES.values())
+        program = next(one.after for one in results if one.step.name == stage)
+    return "".join(f"{line}\n" for line in _pass_lines(program))
 
 
 def _calibration_text(document: Document, project: Project) -> str:
@@ -106,14 +182,15 @@ def compare_specs(
     """Return the difference of two specs after a pass as text; empty if they are equal.
 
     For `document` the differences are by key; else they are a unified diff of both results of
-    `explain_spec` with `values`. Raises SpecError.
+    stages with `values`, of a pass the Programs after it. Raises SpecError.
     """
     names = to_text(spec, "spec"), to_text(other, "other")
     if stage == "document":
         project = to_project(root)
         old, new = (_load_expanded(name, project).root for name in names)
         return format_diff(diff_specs(old, new))
-    before, after = (explain_spec(name, stage, values, root).splitlines() for name in names)
+    stage = to_choice(stage, get_args(PassName), "stage")
+    before, after = (_stage_text(name, stage, values, root).splitlines() for name in names)
     found = difflib.unified_diff(before, after, *names, lineterm="")
     return "".join(f"{line}\n" for line in found)
 

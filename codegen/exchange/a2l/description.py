@@ -9,9 +9,9 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from codegen.emit.c_module import restrict_to_step
 from codegen.emit.c_names import CNames, c_type
 from codegen.exchange.a2l.compu_method import COUNT, TRUTH, Conversion, conversion_of
+from codegen.passes.step_restriction import restrict_to_step
 from language.expressions.units import display_unit
 from language.ir.number_type import MAX_FINITE
 from language.ir.printer import digest

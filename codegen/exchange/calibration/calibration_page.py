@@ -6,9 +6,9 @@ Names are those of the C members behind the name of the automaton: `estimator.J_
 
 from __future__ import annotations
 
-from codegen.emit.c_module import restrict_to_step
 from codegen.emit.c_names import c_member
 from codegen.exchange.calibration.characteristic import Cell, FileAxis, FileCharacteristic
+from codegen.passes.step_restriction import restrict_to_step
 from language.expressions.units import display_unit
 from language.ir.number_type import NumberType, round_to_type, shortest_decimal
 from language.ir.program import TICK_UNIT, Constant, Program, unqualified_name

@@ -6,7 +6,6 @@ import dataclasses
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from codegen.emit.c_module import restrict_to_step
 from codegen.emit.c_names import CNames, c_member, c_type, enumerations
 from codegen.exchange.fmi.unit import SECOND, unit_name
 from codegen.exchange.fmi.variable import (
@@ -17,6 +16,7 @@ from codegen.exchange.fmi.variable import (
     fmi_enumeration_type,
     fmi_type,
 )
+from codegen.passes.step_restriction import restrict_to_step
 from language.ir.number_type import shortest_decimal
 from language.ir.ops import Assign, Value
 from language.ir.program import (

@@ -6,12 +6,14 @@ functions of `ha_math` have no translation.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from codegen.emit.c_expression import format_literal
+from language.ir.expression_type import expression_type
 from language.ir.number_type import NumberType
 from language.ir.ops import Binary, Call, Compare, Expr, Item, Ref, Select, Unary, Value
+from language.ir.program import ValueType
 
 Look = Callable[[str], str]
 """A function from a variable to its text: a predicate for a truth value, else a term."""
@@ -24,10 +26,10 @@ class Unsaid(Exception):
 
 @dataclass(frozen=True)
 class Speech:
-    """A printer of expressions, given the number type and the names of truth values."""
+    """A printer of expressions, given the number type and the types of names."""
 
     number: NumberType
-    truths: Collection[str]
+    types: Mapping[str, ValueType]
 
     def predicate(self, expr: Expr, look: Look) -> str:
         """Return a truth value as a predicate. Raises Unsaid."""
@@ -73,15 +75,10 @@ class Speech:
                 return self.term(argument, look)
         raise Unsaid(expr)
 
+    def is_truth_name(self, name: str) -> bool:
+        """Tell whether a variable or constant is a truth value; an unknown name is none."""
+        return self.types.get(name) == "truth"
+
     def is_truth(self, expr: Expr) -> bool:
         """Tell whether an expression is a truth value."""
-        match expr:
-            case Value(value):
-                return isinstance(value, bool)
-            case Ref(name):
-                return name in self.truths
-            case Unary(operator, _) | Binary(operator, _, _):
-                return operator in ("not", "and", "or")
-            case Select(_, then, _):
-                return self.is_truth(then)
-        return isinstance(expr, Compare)
+        return expression_type(expr, self.types) == "truth"

@@ -42,9 +42,7 @@ class Configuration:
     @cached_property
     def speech(self) -> Speech:
         """The printer of expressions."""
-        truths = [v.name for v in self.made.variables if v.type == "truth"]
-        truths += [c.name for c in self.made.constants if c.type == "truth"]
-        return Speech(self.made.number_type, frozenset(truths))
+        return Speech(self.made.number_type, self.made.types())
 
     @cached_property
     def _known(self) -> frozenset[str]:
@@ -66,7 +64,7 @@ class Configuration:
         if index:
             return f"{self.place(array)}[{self.before(index)}]"
         text = self.place(name)
-        return f"({text} != 0)" if name in self.speech.truths else text
+        return f"({text} != 0)" if self.speech.is_truth_name(name) else text
 
     def before(self, name: str) -> str:
         """Return the value of a variable at the start of a function.

@@ -180,7 +180,7 @@ class Choice:
         if edge.is_change:
             last = edge_value_ref(words.charting.automaton, edge, f"memory.last_{edge.number}")
             text = self._text(level)
-            relation = "<==>" if last.name in words.speech.truths else "=="
+            relation = "<==>" if words.speech.is_truth_name(last.name) else "=="
             turned = f"({old} && !({text} {relation} {words.before(last.name)}))"
             left = [words.now(edge.armed_variable), f"({words.now(last.name)} {relation} {text})"]
         else:

@@ -21,9 +21,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import TypeAlias
 
-from codegen.emit.c_module import emit_c_files, run_c_passes
+from codegen.emit.c_module import emit_c_files
 from codegen.emit.c_names import SOLVED_PREFIX_ON_PAGE, CNames, mode_constant
 from codegen.passes.block_usage import locals_of
+from codegen.passes.pass_list import run_c_passes
 from codegen.proofs.acsl.assigns_contract import (
     add_effect_contracts,
     add_loop_assigns,

@@ -73,7 +73,7 @@ class Summary:
                 if sides == ("\\true", "\\true"):
                     return "\\true"
                 return f"(({test}) ? {sides[0]} : {sides[1]})"
-        relation = "<==>" if name in self.speech.truths else "=="
+        relation = "<==>" if self.speech.is_truth_name(name) else "=="
         return f"(({self.now(name)}) {relation} ({found}))"
 
     def _look(self, values: Values) -> Look:
@@ -119,7 +119,7 @@ class Summary:
     def _value(self, target: str, value: Expr, values: Values) -> Found:
         speech, look = self.speech, self._look(values)
         try:
-            if target in speech.truths:
+            if speech.is_truth_name(target):
                 return _short(speech.predicate(value, look))
             return _short(speech.term(value, look))
         except Unsaid:

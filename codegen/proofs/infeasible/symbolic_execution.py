@@ -61,8 +61,7 @@ class SymbolicProgram:
         self.program = program
         self.terms = Terms(program.number_type)
         self.z3 = self.terms.z3
-        self.kinds = {v.name: v.type for v in (*program.variables, *program.inputs)}
-        self.kinds |= {c.name: c.type for c in program.constants}
+        self.kinds = program.types()
         self.items = items_of(program)
         self.kinds |= {name: "whole" for of in self.items.values() for name in of}
         fixed = (c for c in program.constants if c.kind == "fixed")

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from codegen.emit.c_module import emit_c_files, fault_reason, run_c_passes
+from codegen.emit.c_module import emit_c_files, fault_reason
 from codegen.emit.c_names import c_member, transition_constants
 from codegen.emit.function_comments import describe_function
+from codegen.passes.pass_list import run_c_passes
 from language.ir.program import ENTRY_BLOCKS
 from modewright.api.simulation import program
 

@@ -8,8 +8,9 @@ import re
 
 import pytest
 
-from codegen.emit.c_module import emit_c_files, restrict_to_step
+from codegen.emit.c_module import emit_c_files
 from codegen.passes.fast_path import FastPathMode, add_fast_path
+from codegen.passes.step_restriction import restrict_to_step
 from engine.interpreter.interpreter import Interpreter
 from language.ir.number_type import NUMBER_TYPES, NumberType
 from language.ir.ops import Branch

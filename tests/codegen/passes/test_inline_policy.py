@@ -6,9 +6,10 @@ import shutil
 
 import pytest
 
-from codegen.emit.c_module import emit_c_files, run_c_passes
+from codegen.emit.c_module import emit_c_files
 from codegen.harness.stack_usage import MAX_STEP_STACK_BYTES
 from codegen.passes.inline_policy import select_noinline_blocks
+from codegen.passes.pass_list import run_c_passes
 from codegen.toolchain.external_tools import ARM_COMPILER
 from language.ir.number_type import NumberType
 from modewright.api.code_generation import metrics

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from codegen.emit.c_module import restrict_to_step
+from codegen.passes.step_restriction import restrict_to_step
 from codegen.predictor.predictor import Predictor, build_predictor, columns_of, slice_to_outputs
 from codegen.predictor.predictor_arrays import StackedRecordings
 from codegen.predictor.simd_predictor import simd_recordings_context

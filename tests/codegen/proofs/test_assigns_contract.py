@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from codegen.emit.c_module import emit_c_files, run_c_passes
+from codegen.emit.c_module import emit_c_files
+from codegen.passes.pass_list import run_c_passes
 from codegen.proofs.acsl.assigns_contract import (
     add_effect_contracts,
     add_loop_assigns,

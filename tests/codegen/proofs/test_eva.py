@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from codegen.emit.c_module import run_c_passes
+from codegen.passes.pass_list import run_c_passes
 from codegen.proofs.eva import counter_limits
 from modewright.api.simulation import program
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from codegen.emit.c_module import run_c_passes
+from codegen.passes.pass_list import run_c_passes
 from codegen.proofs.infeasible import spacer as reach
 from codegen.proofs.infeasible.candidate_invariants import AtMost, Within
 from codegen.proofs.infeasible.houdini import find_invariants

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from codegen.coverage.mcdc import COVERAGE_EXPORTER, add_infeasibility_proofs, measure_mcdc
-from codegen.emit.c_module import run_c_passes
+from codegen.passes.pass_list import run_c_passes
 from codegen.proofs.infeasible.infeasible_conditions import (
     decision_sites,
     prove_infeasible,

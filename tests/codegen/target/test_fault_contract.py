@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from codegen.emit.c_module import emit_c_files, run_c_passes
+from codegen.emit.c_module import emit_c_files
+from codegen.passes.pass_list import run_c_passes
 from codegen.proofs.acsl.chart_contract import (
     ChartContract,
     prove_chart_contracts,

@@ -7,7 +7,7 @@ import dataclasses
 from language.ir.ops import Assign, Binary, Op, Ref, Unary, real
 from language.ir.printer import block_lines
 from language.passes.common_subexpressions import eliminate_common_subexpressions
-from tests.language.passes.test_constant_folding import slide
+from tests.language.passes.test_parameter_folding import slide
 
 
 def product() -> Binary:

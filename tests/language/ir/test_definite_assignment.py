@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from codegen.emit.c_module import emit_c_files
-from codegen.passes.definite_assignment import find_unassigned_reads
 from codegen.toolchain.compiler import WARNINGS, find_compiler, flags_at_level
+from language.ir.definite_assignment import find_unassigned_reads
 from language.ir.number_type import NUMBER_TYPES, NumberType
 from language.ir.ops import (
     Assign,

@@ -10,7 +10,9 @@ from language.ir.printer import format_expr
 from language.ir.program import Program
 from language.ir.traversal import walk_ops
 from language.loading.load import lower_automaton
-from language.passes.constant_folding import fold_parameters, hoist_inputs, run_passes
+from language.passes.input_hoisting import hoist_inputs
+from language.passes.parameter_folding import fold_parameters
+from language.passes.pass_list import run_passes
 from tests.language.spec_builders import automaton
 
 TEXT = """language: 1
