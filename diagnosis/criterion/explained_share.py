@@ -15,17 +15,17 @@ from scipy.optimize import brentq
 from diagnosis.data.array_types import Reals
 from diagnosis.estimation.estimate import Estimate
 
-LEAST_FORM_ERROR = 0.01
+LEAST_FORM_ERROR = 0.02
 """Least error of the form of an effect: standard deviation relative to the rms of the effect."""
 FORM_ERROR = 0.4
 """Largest error of the form of an effect; its logarithm is uniform."""
 USUAL_FORM_ERROR: float = FORM_ERROR**0.9 * LEAST_FORM_ERROR ** (1 - 0.9)
-"""Error of the form that 9 of 10 effects do not exceed (0.28)."""
+"""Error of the form that 9 of 10 effects do not exceed (0.30)."""
 FORM_SAMPLES = 8.0
 """Number of independent errors of the form of an effect (its degrees of freedom)."""
-NEGLIGIBLE_ENERGY = 0.03
-"""Energy of the remainder per channel below which no effect is sought: 3 % of the variance that
-nothing explains."""
+NEGLIGIBLE_ENERGY = 0.012
+"""Energy per channel that the errors of form of a base may leave: 1.2 % of the variance that
+nothing explains. A model that explains no more is no effect."""
 MAX_ORDINARY_ENERGY = 1.0
 """Energy of the remainder per channel up to which it may be an ordinary disturbance."""
 
@@ -76,7 +76,7 @@ def sampled_energy(base: Estimate, floor: Reals, correlation: float) -> float:
 def least_share(energy: float = math.inf, parameters: int = 1) -> float:
     """Return the explained share from which an effect is more probable than an unknown disturbance.
 
-    It is where both have the same `log_form_weight`: 0.70 without noise for one parameter, less for
+    It is where both have the same `log_form_weight`: 0.69 without noise for one parameter, less for
     a small `sampled_energy`, more for an effect with more `parameters`; infinite if no share is
     enough.
     """
@@ -94,7 +94,7 @@ def log_form_weight(remaining: float | None, energy: float, parameters: int = 0)
     """Return the logarithm of the posterior mass of an effect that leaves a part of the energy.
 
     The errors of the form are `FORM_SAMPLES` (8) normal variables. Their standard deviation,
-    relative to the effect, has a uniform logarithm from `LEAST_FORM_ERROR` (0.01) to `FORM_ERROR`
+    relative to the effect, has a uniform logarithm from `LEAST_FORM_ERROR` (0.02) to `FORM_ERROR`
     (0.4). The noise adds FORM_SAMPLES / energy to their variance; `energy` is the `sampled_energy`
     of the base. None for `remaining` gives the weight of an unknown disturbance, whose variance is
     the one that fits best. Each of the `parameters` of the effect, and this variance, costs
@@ -112,4 +112,4 @@ def log_form_weight(remaining: float | None, energy: float, parameters: int = 0)
 
 
 MIN_SHARE = least_share()
-"""Explained share from which an effect is more probable than an unknown disturbance (0.70)."""
+"""Explained share from which an effect is more probable than an unknown disturbance (0.69)."""

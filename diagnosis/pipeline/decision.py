@@ -125,7 +125,9 @@ def _decide_by_prediction(
     An effect in `preferred`, which explains simulations, is taken before others.
     """
     selection = select_effects(model_set, base, case.thresholds, log, preferred)
-    selection, locations = detect_unknown_input(model_set, selection, locations, log)
+    selection, locations = detect_unknown_input(
+        model_set, selection, locations, case.thresholds, log
+    )
     outcome, equation = _outcome_of(selection, model_set), None
     if outcome == "unknown":
         equation = discover_equation(

@@ -64,9 +64,10 @@ class Round:
         return is_ordinary(self.energy, len(self.floor))
 
     @property
-    def is_negligible(self) -> bool:
-        """Whether the base leaves too little for an effect."""
-        return self.energy < NEGLIGIBLE_ENERGY * len(self.floor)
+    def negligible_gain(self) -> float:
+        """Gain [nats] of a model that explains a negligible energy."""
+        samples = float(np.sum(self.base.prediction.counts)) / self.correlation
+        return NEGLIGIBLE_ENERGY * samples / 2.0
 
     def least_share_of(self, candidate: CandidateFit) -> float:
         """Return the share that an effect must explain to be as probable as what is unknown.

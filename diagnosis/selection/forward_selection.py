@@ -185,15 +185,16 @@ def _best_candidate(
 ) -> CandidateFit | None:
     """Return the candidate that is the best explanation, None if none gains its threshold.
 
-    There is none either if what the base leaves is negligible. The candidate explains enough, and
-    enough of what is wrong in free simulations; beside accepted effects there must be such a
+    The gain counts as far as it exceeds that of a negligible energy. The candidate explains enough,
+    and enough of what is wrong in free simulations; beside accepted effects there must be such a
     candidate. Those in `preferred` go before others. Of several it is the one of `_most_probable`;
     if none explains enough, it is the one with the largest gain.
     """
-    if compared.is_negligible:
-        return None
+    least = compared.negligible_gain
     enough = [
-        one for one in compared.candidates if one.gain >= thresholds.threshold_of(one.placed_effect)
+        one
+        for one in compared.candidates
+        if one.gain >= thresholds.threshold_of(one.placed_effect) + least
     ]
     explaining = [one for one in enough if compared.is_explained_by(one)]
     if not explaining:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.criterion.effective_sample_size import autocorrelation_sum
+from diagnosis.criterion.threshold import Thresholds
 from diagnosis.data.array_types import Reals
 from diagnosis.data.noise_estimate import MAD_TO_STD
 from diagnosis.data.sampled_recording import SampledRecording
@@ -76,14 +77,15 @@ def detect_unknown_input(
     model_set: ModelSet,
     selection: Selection,
     locations: Sequence[Location],
+    thresholds: Thresholds,
     log: LogCallback = lambda text: None,
 ) -> tuple[Selection, tuple[Location, ...]]:
     """Return the selection with an unknown input, and the locations with its time course.
 
-    It is tried at the balances whose free disturbances gain most, if the base leaves more than a
-    negligible energy. Beside accepted effects more than an ordinary disturbance must be left, of
-    which no effect explains half. Both arguments are returned if the disturbance does not act in
-    windows.
+    It is tried at the balances whose free disturbances gain most. It must gain its threshold and
+    more than a negligible energy. Beside accepted effects more than an ordinary
+    disturbance must be left, of which no effect explains half. The selection and the locations are
+    returned unchanged if the disturbance does not act in windows.
     """
     effects = _unknown_input_effects(model_set)
     if not effects or not _leaves_an_input(selection):
@@ -92,13 +94,15 @@ def detect_unknown_input(
     place = _find_place(model_set, remaining, effects)
     if place is None:
         return selection, tuple(locations)
+    placed_effect = effects[place.path]
+    gain = place.gain / selection.last.correlation
+    if gain < thresholds.threshold_of(placed_effect) + selection.last.negligible_gain:
+        return selection, tuple(locations)
     assert place.free_model is not None
     refitted = _refit_on_inactive_intervals(model_set, place, place.free_model)
     assert refitted.free_model is not None
-    placed_effect = effects[place.path]
     log(f"accepted {placed_effect.id}: inactive most of the time")
     model = with_normal_equations(refitted.free_model, model_set.series)
-    gain = place.gain / selection.last.correlation
     hidden = CandidateFit(placed_effect, gain, model, gain, 1.0)
     selection = dataclasses.replace(
         selection, model=model, accepted=(*selection.accepted, hidden), rivals=()
@@ -110,7 +114,7 @@ def _leaves_an_input(selection: Selection) -> bool:
     """Return whether a selection leaves enough for an unknown input."""
     last = selection.last
     if not selection.accepted:
-        return not last.is_negligible
+        return True
     explained = max((one.share for one in last.candidates if one.gain > 0.0), default=0.0)
     return not last.is_ordinary and explained <= MAX_EXPLAINED_SHARE
 

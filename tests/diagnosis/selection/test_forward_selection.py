@@ -10,7 +10,12 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from diagnosis.criterion.explained_share import FORM_SAMPLES, MAX_ORDINARY_ENERGY, USUAL_FORM_ERROR
+from diagnosis.criterion.explained_share import (
+    FORM_SAMPLES,
+    MAX_ORDINARY_ENERGY,
+    NEGLIGIBLE_ENERGY,
+    USUAL_FORM_ERROR,
+)
 from diagnosis.criterion.threshold import DEFAULT_THRESHOLD, Thresholds
 from diagnosis.data.sampled_recording import SampledRecording
 from diagnosis.estimation.estimate import Estimate
@@ -170,12 +175,24 @@ def beside(*candidates: tuple[PlacedEffect, float, float], total: float = 0.0) -
 def test_an_effect_below_its_threshold_is_not_accepted(
     monkeypatch: pytest.MonkeyPatch, places: list[PlacedEffect]
 ) -> None:
-    round_ = beside((places[0], DEFAULT_THRESHOLD - 0.1, 0.99))
-    assert select(monkeypatch, [round_])[0].accepted == ()
-    group = Thresholds({places[0].effect.name: DEFAULT_THRESHOLD - 1.0})
-    found, lines = select(monkeypatch, [round_, beside()], group)
+    negligible = round_of(fit_of((), COST, [11.0]), []).negligible_gain
+    gain = DEFAULT_THRESHOLD + negligible
+    below = beside((places[0], gain - 0.1, 0.99))
+    assert select(monkeypatch, [below])[0].accepted == ()
+    above = beside((places[0], gain + 0.1, 0.99))
+    found, lines = select(monkeypatch, [above, beside()])
     assert [one.placed_effect for one in found.accepted] == [places[0]]
-    assert lines == [f"accepted {places[0].id}: 20 nats, 99%"]
+    assert lines == [f"accepted {places[0].id}: {gain + 0.1:.0f} nats, 99%"]
+    group = Thresholds({places[0].effect.name: DEFAULT_THRESHOLD - 1.0})
+    found, _ = select(monkeypatch, [below, beside()], group)
+    assert [one.placed_effect for one in found.accepted] == [places[0]]
+
+
+def test_the_negligible_gain_is_that_of_a_small_energy_in_all_independent_samples() -> None:
+    round_ = dataclasses.replace(round_of(fit_of((), COST, [11.0, 4.0]), []), correlation=2.0)
+    samples = round_.base.prediction.counts / 2.0
+    gain = float(np.sum(samples / 2.0 * np.log1p(NEGLIGIBLE_ENERGY)))
+    assert round_.negligible_gain == pytest.approx(gain, rel=0.01)
 
 
 def test_an_effect_that_explains_little_is_not_accepted(

@@ -33,6 +33,7 @@ class Constants:
     form_error: float = explained_share.FORM_ERROR
     form_samples: float = explained_share.FORM_SAMPLES
     max_ordinary_energy: float = explained_share.MAX_ORDINARY_ENERGY
+    negligible_energy: float = explained_share.NEGLIGIBLE_ENERGY
 
 
 @contextmanager
@@ -43,6 +44,7 @@ def use_constants(constants: Constants) -> Iterator[None]:
         FORM_ERROR=constants.form_error,
         FORM_SAMPLES=constants.form_samples,
         MAX_ORDINARY_ENERGY=constants.max_ordinary_energy,
+        NEGLIGIBLE_ENERGY=constants.negligible_energy,
     ):
         yield
 
@@ -54,8 +56,9 @@ def verdict_probabilities(decision: Mapping[str, Any]) -> dict[str, float]:
     certainty; else the masses of the comparison count.
     """
     candidates = decision["candidates"]
+    threshold = DEFAULT_THRESHOLD + _negligible_gain(decision)
     is_named = any(
-        (one["gain"] or 0.0) >= DEFAULT_THRESHOLD
+        (one["gain"] or 0.0) >= threshold
         and (one["share"] or 0.0) >= explained_share.least_share(parameters=one["parameters"])
         for one in candidates
     )
@@ -76,6 +79,16 @@ def verdict_probabilities(decision: Mapping[str, Any]) -> dict[str, float]:
     for name, mass in zip(names, masses / masses.sum(), strict=True):
         found[name] = found.get(name, 0.0) + float(mass)
     return found
+
+
+def _negligible_gain(decision: Mapping[str, Any]) -> float:
+    """Return the gain [nats] of a model that explains a negligible energy.
+
+    The number of independent samples is the sampled energy over the energy of a channel.
+    """
+    energy, sampled = decision["energy"], decision["sampled_energy"]
+    samples = sampled * decision["channels"] / energy if energy and sampled else 0.0
+    return float(explained_share.NEGLIGIBLE_ENERGY * samples / 2.0)
 
 
 def log_score(answer: Answer) -> float:
