@@ -33,7 +33,6 @@ class Constants:
     form_error: float = explained_share.FORM_ERROR
     form_samples: float = explained_share.FORM_SAMPLES
     max_ordinary_energy: float = explained_share.MAX_ORDINARY_ENERGY
-    negligible_energy: float = explained_share.NEGLIGIBLE_ENERGY
 
 
 @contextmanager
@@ -44,7 +43,6 @@ def use_constants(constants: Constants) -> Iterator[None]:
         FORM_ERROR=constants.form_error,
         FORM_SAMPLES=constants.form_samples,
         MAX_ORDINARY_ENERGY=constants.max_ordinary_energy,
-        NEGLIGIBLE_ENERGY=constants.negligible_energy,
     ):
         yield
 
