@@ -94,7 +94,7 @@ def test_each_change_has_its_files() -> None:
 def test_each_command_has_the_chain_of_an_option() -> None:
     (rows,) = _change_tables("| command |")
     commands = {cells[0].strip("`"): cells[1] for cells in rows}
-    known = {command.__name__ for command in COMMANDS} | {"recording", "calibration"}
+    known = {command.__name__ for command in COMMANDS} | {"recording", "calibration", "demo"}
     assert set(commands) == known
     for name, module in commands.items():
         assert module.startswith(f"`modewright/cli/commands/{name}.py`")
