@@ -31,6 +31,7 @@ import pytest
 
 import modewright as mw
 from modewright.cli.app import app, expand_arguments
+from modewright.cli.common.console import console
 from modewright.cli.common.exit_codes import run_with_exit_code
 
 BLOCK = re.compile(r"^( *)```(\w*) ?([^\n]*)\n(.*?)^\1```$", re.DOTALL | re.MULTILINE)
@@ -75,6 +76,8 @@ def run_page(
     page: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], is_long: bool
 ) -> None:
     """Do in the working folder what the page says; with `is_long` the slow commands as well."""
+    monkeypatch.delenv("COLUMNS", raising=False)
+    console.cache_clear()  # an earlier test may have made it for a narrow terminal
     printed: str | None = None
     excerpts = []
     for block in read_blocks(page):
