@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 import shlex
 import subprocess
+import tomllib
 from functools import partial
 from pathlib import Path
 
 import pytest
+import yaml
 from typer.testing import CliRunner
 
 import modewright as mw
@@ -56,6 +58,14 @@ def test_the_excerpts_on_the_language_page_have_no_unknown_key(tmp_path: Path) -
     assert not {kind for kinds in found.values() for kind in kinds} - {"name", "missing", "run"}
     whole = ("system: ", "variant: drive", "map: ", "effect: ", "calibration: ")
     assert not set().union(*(found[first] for first in found if first.startswith(whole)))
+
+
+def test_the_citation_has_the_version_and_the_licence_of_the_package() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    for key in ("version", "license"):
+        assert str(citation[key]) == project[key]
+    assert citation["title"] == project["name"] and citation["authors"] and citation["message"]
 
 
 def test_every_command_has_a_row_on_its_page() -> None:
