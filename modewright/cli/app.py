@@ -82,13 +82,13 @@ COMPLETION_VARIABLE = "_MODEWRIGHT_COMPLETE"
 COMMANDS = (
     new, check, test, trace, diagnose, fit, effects, simulate, sweep, sensitivity,
     lockstep, replay, plot, compare, graph, generate, a2l, dbc, fmu, metrics, prove, fuzz, mcdc,
-    explain, diff, format, schema, lsp, demo, doctor,
+    explain, diff, format, schema, lsp, doctor,
 )  # fmt: skip
 """The commands in the order of the help."""
 
 
 def build_application(arguments: Collection[str] | None = None) -> typer.Typer:
-    """Return the application with all COMMANDS and the groups `recording` and `calibration`.
+    """Return the application with all COMMANDS and the groups recording, calibration and demo.
 
     Given the arguments of the command line, only commands that are named in them have their
     parameters; the others are stubs with name and help, because the inspection of parameters is
@@ -107,6 +107,7 @@ def build_application(arguments: Collection[str] | None = None) -> typer.Typer:
         typer_app.command(epilog=EXIT_CODES)(command if is_complete else command_stub(command))
     typer_app.add_typer(recording, name="recording")
     typer_app.add_typer(calibration, name="calibration")
+    typer_app.add_typer(demo, name="demo")
     return typer_app
 
 

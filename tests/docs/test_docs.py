@@ -5,15 +5,17 @@ from __future__ import annotations
 import re
 import shlex
 import subprocess
+import tomllib
 from functools import partial
 from pathlib import Path
 
 import pytest
+import yaml
 from typer.testing import CliRunner
 
 import modewright as mw
 from codegen.toolchain.compiler import compile_program
-from modewright.cli.app import app
+from modewright.cli.app import COMMANDS, app
 from modewright.cli.common.exit_codes import run_with_exit_code
 
 ROOT = Path(__file__).parents[2]
@@ -21,7 +23,7 @@ README = (ROOT / "README.md").read_text()
 
 
 def test_the_spec_in_the_readme_has_15_lines_and_no_problem(tmp_path: Path) -> None:
-    text = re.findall(r"```yaml\n(.*?)```", README, re.DOTALL)[0]
+    text = re.findall(r"```yaml \S+\n(.*?)```", README, re.DOTALL)[0]
     spec = tmp_path / "readme.yaml"
     spec.write_text(text)
     assert len(text.splitlines()) == 15
@@ -58,10 +60,20 @@ def test_the_excerpts_on_the_language_page_have_no_unknown_key(tmp_path: Path) -
     assert not set().union(*(found[first] for first in found if first.startswith(whole)))
 
 
-def test_every_command_in_the_readme_exists() -> None:
-    used = set(re.findall(r"`modewright (\w+) ", README))
-    assert used == set(re.findall(r"\| `modewright (\w+)", README))
-    for name in used:
+def test_the_citation_has_the_version_and_the_licence_of_the_package() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    for key in ("version", "license"):
+        assert str(citation[key]) == project[key]
+    assert citation["title"] == project["name"] and citation["authors"] and citation["message"]
+
+
+def test_every_command_has_a_row_on_its_page() -> None:
+    page = (ROOT / "docs" / "commands.md").read_text()
+    named = set(re.findall(r"`modewright (\w+)", page))
+    own = {command.__name__ for command in COMMANDS} | {"recording", "calibration", "demo"}
+    assert named == own
+    for name in named:
         assert CliRunner().invoke(app, [name, "--help"]).exit_code == 0
 
 

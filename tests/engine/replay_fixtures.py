@@ -22,7 +22,7 @@ from language.text.diagnostic import Problems
 
 ROOT = Path(__file__).parents[2]
 PAPER = ROOT / "tests/data/paper"
-TWIN = ROOT / "tests/data/synthetic_nissan_leaf/drive_twin.csv"
+TWIN = ROOT / "modewright/api/demo_data_files/recordings/leaf_tip_out/drive_twin.csv"
 TWIN_SCRIPT = ROOT / "tests/data/synthetic_nissan_leaf/make_synthetic_recording.py"
 ESTIMATORS = ("estimator", "estimator_simple")
 

@@ -259,6 +259,8 @@ def test_every_module_of_the_wheel_can_be_imported(python: Path, folder: Path) -
         ["doctor"],
         ["simulate", "ev_driveline", "-s", "tip_out", "--plot", "run.svg"],
         ["generate", "estimator", "--out", "c"],
+        ["demo", "recordings", "--out", "demo"],
+        ["demo", "diagnose", "--out", "demo"],
         ["fmu", "estimator", "--out", "estimator.fmu"],
         ["replay", "estimator", TRACE, "--map", "reference_trace"],
         [*COMMAND, "--out", "found"],

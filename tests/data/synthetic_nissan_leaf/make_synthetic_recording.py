@@ -15,7 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-TARGET = Path(__file__).with_name("drive_twin.csv")
+ROOT = Path(__file__).resolve().parents[3]
+TARGET = ROOT / "modewright/api/demo_data_files/recordings/leaf_tip_out/drive_twin.csv"
 HEAD = (
     "t_s,em_torque_Nm,em_speed_rpm,inv_voltage_V,em_torque_cmd_Nm,batt_V,batt_A,"
     "wheel_a_kmh,wheel_b_kmh,abs_speed_kmh,t_wheel_s"

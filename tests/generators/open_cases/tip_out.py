@@ -24,7 +24,7 @@ variant: paper_driveline
 extends: blind_driveline
 parameters:
   R:     {value: 8.1}
-  J_em:  {value: 0.05 kg*m^2, range: [0.04, 0.06]}
+  J_em:  {range: [0.04, 0.06]}
   k:     {value: 4800 N*m/rad, range: [3800, 5800]}
   c:     {value: 14 N*m*s/rad, range: [9, 21]}
   alpha: {value: 0.0256 rad, range: [0.02, 0.031]}
