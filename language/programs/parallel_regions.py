@@ -6,23 +6,21 @@ language/integration/vector_field.py instead, which resets and enters at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from language.integration.vector_field import (
     VectorField,
-    all_bindings_at_point,
     bindings_at_point,
-    set_point_to_state,
     set_target_mode,
+    stage_bindings,
 )
-from language.ir.ops import Assign, Block, Branch, Expr, Op, RunBlock, Switch, integer
-from language.lowering.action_stages import lower_stage_of_regions
-from language.lowering.expressions import choose_by_mode, lower_equations, names_read
+from language.ir.ops import Assign, Block, Branch, Expr, Op, RunBlock, integer
+from language.lowering.action_stages import common_stages, lower_transition, select_blocks
+from language.lowering.expressions import choose_by_mode
 from language.lowering.guard_variable_names import guard_slot
 from language.model.automaton import Mode, Transition
-from language.model.declaration import Formula
-from language.model.region_queries import transitions_by_priority
+from language.model.region_queries import transitions_by_priority, transitions_of_regions
 
 
 @dataclass(frozen=True)
@@ -97,58 +95,12 @@ def _commit_block(field: VectorField, selection: TransitionSelection) -> Block:
     `in(...)` reads the source modes up to the entries.
     """
     automaton = field.automaton
-    before = _lower_stage(
-        field, selection, lambda transition: automaton.source_mode(transition).exit
+    selected = [
+        (each, (selection.selected_variable(each.region), selection.number_of(each)))
+        for each in transitions_of_regions(automaton)
+    ]
+    moved = select_blocks(
+        (by, (set_target_mode(field, each), *selection.after_switch(each))) for each, by in selected
     )
-    resets = _lower_stage(field, selection, lambda transition: transition.reset)
-    if before and resets:
-        before = (*before, *set_point_to_state(field))
-    moved = []
-    for region in automaton.all_regions:
-        transitions = [
-            transition for mode in region.modes.values() for transition in mode.transitions
-        ]
-        cases = [
-            (
-                selection.number_of(transition),
-                (set_target_mode(field, transition), *selection.after_switch(transition)),
-            )
-            for transition in transitions
-        ]
-        moved.append(Switch(selection.selected_variable(region.name), tuple(cases)))
-    after = _lower_stage(
-        field, selection, lambda transition: automaton.target_mode(transition).entry
-    )
-    if after:
-        after = (*set_point_to_state(field), *_entry_equations(field), *after)
-    return (*before, *resets, *moved, *after)
-
-
-def _lower_stage(
-    field: VectorField,
-    selection: TransitionSelection,
-    assignments_of: Callable[[Transition], Mapping[str, Formula]],
-) -> Block:
-    """Return one stage of the selected transitions of all regions."""
-    known, number = all_bindings_at_point(field), selection.number_of
-    return lower_stage_of_regions(
-        field.automaton, selection.selected_variable, number, assignments_of, known
-    )
-
-
-def _entry_equations(field: VectorField) -> Block:
-    """Return the equations that entries read, evaluated in the new modes after the reset."""
-    automaton = field.automaton
-    entries = [formula for mode in automaton.all_modes for formula in mode.entry.values()]
-    required = names_read(formula.tree for formula in entries)
-    cases = []
-    for mode in automaton.modes.values():
-        ops = lower_equations(
-            mode, bindings_at_point(field), "work.at_", field.key_prefix, required
-        )
-        cases.append((mode.number, tuple(ops)))
-    return (
-        (Switch(field.mode_variable_name, tuple(cases)),)
-        if any(block for _, block in cases)
-        else ()
-    )
+    read = stage_bindings(field, automaton.modes.values())
+    return lower_transition(automaton, common_stages(automaton, selected), read, moved)
