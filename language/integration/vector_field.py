@@ -17,7 +17,6 @@ from language.ir.ops import (
     Assign,
     Binary,
     Block,
-    Branch,
     Compare,
     Expr,
     Op,
@@ -52,16 +51,13 @@ from language.lowering.guard_variable_names import (
     mode_bindings,
 )
 from language.lowering.program_builder import equation_variables
+from language.lowering.transition_choice import choose_by_priority
 from language.model.automaton import Automaton, Balance, Mode, Transition
 from language.model.region_queries import (
     possible_balances,
     region_of_balance,
-    transitions_by_priority,
     watched_transitions,
 )
-
-ALWAYS = Value(True)
-"""The condition of a transition that is taken if no other one is enabled."""
 
 
 @dataclass(frozen=True)
@@ -213,21 +209,6 @@ def any_guard_condition(
     return result
 
 
-def select_by_priority(
-    mode: Mode, enabled: Mapping[int, Expr], effects: Mapping[int, Block]
-) -> Block:
-    """Return the operations of the enabled transition with the smallest priority (rule 3a).
-
-    `enabled` and `effects` map the index of a transition in the mode to its condition and its
-    operations. A transition with the condition `ALWAYS` is taken without a test, and those after it
-    are left out. If none is enabled, nothing happens.
-    """
-    ops: Block = ()
-    for k, _ in reversed(transitions_by_priority(mode)):
-        ops = effects[k] if enabled[k] == ALWAYS else (Branch(enabled[k], effects[k], ops),)
-    return ops
-
-
 def lower_single_region_step(
     field: VectorField, mode: Mode, enabled: Mapping[int, Expr], extra_effects: Mapping[int, Block]
 ) -> Block:
@@ -247,7 +228,7 @@ def lower_single_region_step(
         )
         for k, transition in enumerate(mode.transitions)
     }
-    return select_by_priority(mode, enabled, fire)
+    return choose_by_priority(mode, enabled, fire)
 
 
 def stage_bindings(field: VectorField, targets: Iterable[Mode]) -> StageBindings:

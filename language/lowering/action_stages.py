@@ -205,11 +205,11 @@ def lower_stage(automaton: Automaton, stage: Stage, known: NameBindings) -> Bloc
     `known` are the names before the stage. A single unconditional assignment to a variable of a
     continuous automaton needs no `work` variable.
     """
-    if not automaton.is_sampled and [len(action.assignments) for action in stage] == [1]:
-        (name,), (read,) = stage[0].assignments, read_stage(automaton, stage[0].assignments, known)
-        if stage[0].selection == ALWAYS:
-            return (Assign(storage_of(automaton, name), read.value, read.key),)
     reads = [(each.selection, (*read_stage(automaton, each.assignments, known),)) for each in stage]
+    match reads:
+        case [(selection, (read,))] if selection == ALWAYS and not automaton.is_sampled:
+            (name,) = stage[0].assignments
+            return (Assign(storage_of(automaton, name), read.value, read.key),)
     commits = [
         (each.selection, (*commit_stage(automaton, each.assignments), *each.then)) for each in stage
     ]

@@ -19,7 +19,6 @@ from language.integration.crossing_location import (
 )
 from language.integration.method_selection import build_method
 from language.integration.vector_field import (
-    ALWAYS,
     VectorField,
     field_blocks,
     field_variables,
@@ -53,6 +52,7 @@ from language.lowering.linearisation import LinearisationPoint, linearise_model
 from language.lowering.program_builder import enter_initial_modes
 from language.lowering.program_parameters import cast_to_type, constant_bindings
 from language.lowering.range_saturation import saturate_written_states
+from language.lowering.transition_choice import ALWAYS_ENABLED
 from language.model.automaton import Automaton, Mode, ModelRun
 from language.model.constant_states import written_states
 from language.model.region_queries import transitions_by_priority
@@ -314,7 +314,7 @@ def _switch_block(field: VectorField, mode: Mode) -> Block:
     """
     enabled: dict[int, Expr] = {k: Ref(f"work.guard_{k}") for k in range(len(mode.transitions))}
     for k, _ in transitions_by_priority(mode)[-1:]:
-        enabled[k] = ALWAYS
+        enabled[k] = ALWAYS_ENABLED
     return lower_single_region_step(field, mode, enabled, {})
 
 

@@ -15,12 +15,13 @@ from language.integration.vector_field import (
     set_target_mode,
     stage_bindings,
 )
-from language.ir.ops import Assign, Block, Branch, Expr, Op, RunBlock, integer
+from language.ir.ops import Assign, Block, Expr, Op, RunBlock, integer
 from language.lowering.action_stages import common_stages, lower_transition, select_blocks
 from language.lowering.expressions import choose_by_mode
 from language.lowering.guard_variable_names import guard_slot
+from language.lowering.transition_choice import choose_by_priority
 from language.model.automaton import Mode, Transition
-from language.model.region_queries import transitions_by_priority, transitions_of_regions
+from language.model.region_queries import transitions_of_regions
 
 
 @dataclass(frozen=True)
@@ -77,16 +78,13 @@ def lower_parallel_step(field: VectorField, mode: Mode, selection: TransitionSel
 
 def _select_transition(mode: Mode, selection: TransitionSelection, prefix: str) -> Block:
     """Return the operations that select the enabled transition with the smallest priority."""
-    ops: Block = ()
-    for k, transition in reversed(transitions_by_priority(mode)):
-        number = integer(selection.number_of(transition))
-        taken = Assign(selection.selected_variable(mode.region), number, prefix + transition.key)
-        ops = (
-            Branch(
-                selection.enabled_condition(transition, guard_slot(mode.region, k)), (taken,), ops
-            ),
-        )
-    return ops
+    enabled: dict[int, Expr] = {}
+    taken: dict[int, Block] = {}
+    for k, transition in enumerate(mode.transitions):
+        variable, number = selection.selected_variable(mode.region), selection.number_of(transition)
+        enabled[k] = selection.enabled_condition(transition, guard_slot(mode.region, k))
+        taken[k] = (Assign(variable, integer(number), prefix + transition.key),)
+    return choose_by_priority(mode, enabled, taken)
 
 
 def _commit_block(field: VectorField, selection: TransitionSelection) -> Block:

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections import ChainMap
 from collections.abc import Mapping
 
 from language.ir.analysis_cache import cache_on_owner
 from language.ir.ops import (
     Assign,
     Block,
-    Branch,
-    Compare,
-    Count,
     Expr,
     Op,
-    Ref,
     RunBlock,
     integer,
 )
@@ -27,12 +22,13 @@ from language.lowering.action_stages import (
     select_blocks,
     transition_stages,
 )
-from language.lowering.edge_detection import detect_edges, guard_memory_bindings, reset_activation
-from language.lowering.expressions import equation_bindings, lower_expression
+from language.lowering.edge_detection import reset_activation
+from language.lowering.expressions import equation_bindings
 from language.lowering.tick_history import Rollback
-from language.lowering.transition_metadata import infos_of_mode, start_run, wait_ticks
+from language.lowering.transition_choice import choose_by_priority, lower_sampled_choice
+from language.lowering.transition_metadata import infos_of_mode, start_run
 from language.model.automaton import Automaton, Mode, Transition
-from language.model.region_queries import transitions_by_priority, transitions_of_regions
+from language.model.region_queries import transitions_of_regions
 from language.programs.rewind import (
     advance_from_crossing,
     rollback_bindings,
@@ -48,29 +44,18 @@ def lower_sampled_jump(
 ) -> Block:
     """Return the jump of a mode: edges, wait counters, then at most one transition (rules 3 and 4).
 
-    Of the enabled transitions that with the smallest priority is taken. The first tick with a true
-    guard counts 1, so a wait of N ticks is over when the counter exceeds N. With parallel regions
-    the jump sets the fired-transition variable only; `lower_sampled_commit` performs the actions
-    (rule 14). `now` are the bindings without equations.
+    With parallel regions the jump sets the fired-transition variable only; `lower_sampled_commit`
+    performs the actions (rule 14). `now` are the bindings without equations.
     """
-    everywhere = {**now, **equation_bindings(automaton, "equation.")}
-    edges = detect_edges(automaton, mode, everywhere)
-    known = ChainMap(guard_memory_bindings(automaton, mode), everywhere)
+    known = {**now, **equation_bindings(automaton, "equation.")}
     own = infos_of_mode(automaton, mode, infos)
-    counters: list[Op] = []
-    chain: Block = ()
-    for k, transition in reversed(transitions_by_priority(mode)):
-        info = own[k]
-        enabled = lower_expression(transition.when.tree, known)
-        if info.timer:
-            key = f"{automaton.name} {transition.when.key}"
-            counters.insert(0, Count(info.timer, enabled, info.timer_limit, key))
-            enabled = Compare(">", Ref(info.timer), wait_ticks(info))
-        fire: list[Op] = [Assign(fired_variable(mode.region), integer(info.number), info.key)]
+    choice = lower_sampled_choice(automaton, mode, known, own)
+    fire: dict[int, Block] = {}
+    for k, (transition, info) in enumerate(zip(mode.transitions, own, strict=True)):
+        fire[k] = (Assign(fired_variable(mode.region), integer(info.number), info.key),)
         if not automaton.regions:
-            fire = _lower_transition(automaton, transition, infos, (now, known), fire)
-        chain = (Branch(enabled, tuple(fire), chain),)
-    return (*edges, *counters, *chain)
+            fire[k] = _lower_transition(automaton, transition, infos, (now, known), fire[k])
+    return (*choice.edges, *choice.counts, *choose_by_priority(mode, choice.enabled, fire))
 
 
 def _lower_transition(
@@ -78,8 +63,8 @@ def _lower_transition(
     transition: Transition,
     infos: tuple[TransitionInfo, ...],
     bindings: tuple[Mapping[str, Expr], Mapping[str, Expr]],
-    fired_ops: list[Op],
-) -> list[Op]:
+    fired_ops: Block,
+) -> Block:
     """Return the actions of a transition in an automaton without parallel regions (rule 6).
 
     A transition with `rewind` goes back to the crossing first and advances to the present
@@ -87,19 +72,19 @@ def _lower_transition(
     """
     target = automaton.target_mode(transition)
     now, known = bindings
-    go_back: list[Op] = []
+    go_back: Block = ()
     advance: Block = ()
     if transition.rewind:
         source = automaton.source_mode(transition)
         rollback = Rollback(automaton, source, transition, transition.rewind)
         now = rollback_bindings(automaton, now)
         known = {**now, **rollback_equation_bindings(rollback)}
-        go_back = [RunBlock(f"rollback_{rollback.block_suffix}")]
+        go_back = (RunBlock(f"rollback_{rollback.block_suffix}"),)
         advance = advance_from_crossing(rollback)
     stages = transition_stages(automaton, transition)
     moved = (*_switch_mode(automaton, transition, infos), *fired_ops, *start_run(automaton, target))
     read = bindings_of_target(automaton, target, now, known)
-    return [*go_back, *lower_transition(automaton, stages, read, moved), *advance]
+    return (*go_back, *lower_transition(automaton, stages, read, moved), *advance)
 
 
 def lower_sampled_commit(
