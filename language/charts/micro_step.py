@@ -7,7 +7,7 @@ stage; then entries run from the outside in. Each stage reads one snapshot.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from language.charts.chart_context import (
     IS_FIRST_STEP,
@@ -43,7 +43,6 @@ from language.ir.ops import (
 )
 from language.ir.program import LOG_COUNT_VARIABLE, LOG_VARIABLE, Variable, fired_variable
 from language.lowering.action_stages import (
-    Action,
     Selection,
     TransitionStages,
     bindings_of_targets,
@@ -60,7 +59,7 @@ from language.lowering.event_queue import (
     enqueue_input_events,
     event_queue_variables,
 )
-from language.model.automaton import Transition
+from language.model.automaton import Mode, Transition
 from language.model.declaration import MICRO_STEP_LIMIT_FAULT
 from language.model.statechart import ROOT
 
@@ -218,29 +217,37 @@ def _commit_block(context: ChartContext, evaluate_equations: Op) -> Block:
 
     The flags of the nodes that are left and entered select their actions.
     """
-    modes = [(node, mode) for node in context.chart.nodes if (mode := context.mode_of(node))]
-    leaving = [(exit_flag(node).name, node, mode.exit) for node, mode in modes if mode.exit]
-    coming = [(entry_flag(node).name, node, mode.entry) for node, mode in modes if mode.entry]
+    nodes = context.chart.nodes
+
+    def flagged(flags: Mapping[int, str]) -> list[tuple[Mode, int, Selection]]:
+        """Return the modes of nodes with a flag, each with its depth and its flag."""
+        modes = ((context.mode_of(nodes[index]), index, flag) for index, flag in flags.items())
+        return [(m, context.chart.depth(nodes[k]), (flag, True)) for m, k, flag in modes if m]
+
     stages = order_stages(
-        ((context.chart.depth(node), Action(own, (flag, True))) for flag, node, own in leaving),
-        (_reset_action(context, each) for each, _ in context.all_transitions),
-        ((context.chart.depth(node), Action(own, (flag, True))) for flag, node, own in coming),
+        flagged(context.exit_flags),
+        (
+            (transition, _selection(context, transition), _raise_events(context, transition))
+            for transition, _ in context.all_transitions
+        ),
+        flagged(context.entry_flags),
     )
     read = bindings_of_targets(context.automaton, context.base_bindings, evaluate_equations)
+    flags = (*context.exit_flags.values(), *context.entry_flags.values())
     return (
-        *(Assign(flag, Value(False)) for flag, *_ in (*leaving, *coming)),
+        *(Assign(flag, Value(False)) for flag in flags),
         *_log_and_exit(context),
         *lower_transition(context.automaton, stages, read, _enter_targets(context)),
         evaluate_equations,
     )
 
 
-def _reset_action(context: ChartContext, transition: Transition) -> Action:
-    """Return the reset of a transition, with the events that it raises afterwards."""
-    raised: list[Op] = []
+def _raise_events(context: ChartContext, transition: Transition) -> Block:
+    """Return the operations that enqueue the events which a transition raises."""
+    ops: list[Op] = []
     for name in transition.raises:
-        raised += enqueue_event(context.chart, name, context.queue_capacity)
-    return Action(transition.reset, _selection(context, transition), tuple(raised))
+        ops += enqueue_event(context.chart, name, context.queue_capacity)
+    return tuple(ops)
 
 
 def _selection(context: ChartContext, transition: Transition) -> Selection:

@@ -68,18 +68,24 @@ class TransitionStages:
 
 
 def order_stages(
-    exits: Iterable[tuple[int, Action]],
-    resets: Iterable[Action],
-    entries: Iterable[tuple[int, Action]],
+    sources: Iterable[tuple[Mode, int, Selection]],
+    transitions: Iterable[tuple[Transition, Selection, Block]],
+    targets: Iterable[tuple[Mode, int, Selection]],
 ) -> TransitionStages:
-    """Return the stages of actions in their order (rule 6); actions that do nothing are left out.
+    """Return the stages of transitions that are taken together, in their order (rule 6).
 
-    `exits` and `entries` have the depth of their mode in the chart. The actions of one depth are
-    one stage, and so are all resets.
+    `sources` are the modes that are left and `targets` those that are entered, with their depth in
+    the chart. The exits of one depth are one stage, and so are its entries and all resets. The
+    block of a transition follows its reset. Actions that do nothing are left out.
     """
-    reset = tuple(action for action in resets if action.assignments or action.then)
-    before = (*reversed(_stages_by_depth(exits)), *((reset,) if reset else ()))
-    return TransitionStages(before, _stages_by_depth(entries))
+    exits = _stages_by_depth((depth, Action(mode.exit, when)) for mode, depth, when in sources)
+    resets = tuple(
+        Action(transition.reset, when, then)
+        for transition, when, then in transitions
+        if transition.reset or then
+    )
+    entries = _stages_by_depth((depth, Action(mode.entry, when)) for mode, depth, when in targets)
+    return TransitionStages((*reversed(exits), *((resets,) if resets else ())), entries)
 
 
 def _stages_by_depth(actions: Iterable[tuple[int, Action]]) -> tuple[Stage, ...]:
@@ -101,21 +107,15 @@ def common_stages(
 ) -> TransitionStages:
     """Return the stages of transitions of parallel regions without nesting, each if selected."""
     return order_stages(
-        (
-            (0, Action(automaton.source_mode(each).exit, selection))
-            for each, selection in transitions
-        ),
-        (Action(each.reset, selection) for each, selection in transitions),
-        (
-            (0, Action(automaton.target_mode(each).entry, selection))
-            for each, selection in transitions
-        ),
+        ((automaton.source_mode(each), 0, when) for each, when in transitions),
+        ((each, when, ()) for each, when in transitions),
+        ((automaton.target_mode(each), 0, when) for each, when in transitions),
     )
 
 
 def initial_stages(modes: Iterable[tuple[int, Mode]]) -> TransitionStages:
     """Return the stages of a start: the entries of the initial modes, each with its depth."""
-    return order_stages((), (), ((depth, Action(mode.entry)) for depth, mode in modes))
+    return order_stages((), (), ((mode, depth, ALWAYS) for depth, mode in modes))
 
 
 def stage_reads(stages: Iterable[Stage]) -> list[str]:

@@ -35,6 +35,15 @@ def choose_by_priority(
     return ops
 
 
+def without_last_test(mode: Mode, enabled: Mapping[int, Expr]) -> dict[int, Expr]:
+    """Return the conditions by index, of which one is known to hold.
+
+    The last transition in the order of priority is then enabled if no other one is.
+    """
+    last = {k: ALWAYS_ENABLED for k, _ in transitions_by_priority(mode)[-1:]}
+    return {**enabled, **last}
+
+
 @dataclass(frozen=True)
 class SampledChoice:
     """The choice of a transition of a mode of a sampled automaton.

@@ -52,10 +52,9 @@ from language.lowering.linearisation import LinearisationPoint, linearise_model
 from language.lowering.program_builder import enter_initial_modes
 from language.lowering.program_parameters import cast_to_type, constant_bindings
 from language.lowering.range_saturation import saturate_written_states
-from language.lowering.transition_choice import ALWAYS_ENABLED
+from language.lowering.transition_choice import without_last_test
 from language.model.automaton import Automaton, Mode, ModelRun
 from language.model.constant_states import written_states
-from language.model.region_queries import transitions_by_priority
 from language.numerics.evaluate import Scalar
 from language.programs.parallel_regions import (
     TransitionSelection,
@@ -313,9 +312,7 @@ def _switch_block(field: VectorField, mode: Mode) -> Block:
     priority is not tested.
     """
     enabled: dict[int, Expr] = {k: Ref(f"work.guard_{k}") for k in range(len(mode.transitions))}
-    for k, _ in transitions_by_priority(mode)[-1:]:
-        enabled[k] = ALWAYS_ENABLED
-    return lower_single_region_step(field, mode, enabled, {})
+    return lower_single_region_step(field, mode, without_last_test(mode, enabled), {})
 
 
 def _mode_variables(model: Automaton) -> list[Variable]:
