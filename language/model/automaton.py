@@ -181,6 +181,11 @@ class Mode:
         return name.replace(".", "_")
 
     @property
+    def has_entry_or_exit(self) -> bool:
+        """Whether the mode has entry or exit actions."""
+        return bool(self.entry or self.exit)
+
+    @property
     def jump_assignments(self) -> tuple[Mapping[str, Formula], ...]:
         """The resets of its transitions, its entry and its exit, each by variable."""
         return (*(transition.reset for transition in self.transitions), self.entry, self.exit)

@@ -238,7 +238,7 @@ def _substep_with_events(
 
 def _refuse_actions(automaton: Automaton, model: Automaton, problems: Problems) -> None:
     """Report a model with discrete variables, entry or exit actions, which a run cannot carry."""
-    acting = any(mode.entry or mode.exit for mode in model.all_modes)
+    acting = any(mode.has_entry_or_exit for mode in model.all_modes)
     if model.discrete or acting:
         what = "discrete variables" if model.discrete else "entry or exit actions"
         label = f"a run inside a tick carries states alone: `{model.name}` has {what}"
