@@ -110,11 +110,15 @@ CRITERIA: dict[str, Callable[[ast.Module], bool]] = {
 """What only the home of a rule does, by rule."""
 
 
+READERS = {"3a": {"codegen/proofs/acsl/chart_selection_contract.py"}}
+"""The modules that state in a contract what the home of a rule computes, by rule."""
+
+
 @pytest.mark.parametrize("name", CRITERIA)
 def test_a_rule_is_lowered_in_its_home_alone(name: str) -> None:
     (rule,) = [rule for rule in leaf_rules() if (rule.page, rule.name) == (SEMANTICS, name)]
-    lowered = [path for path, tree in _modules().items() if CRITERIA[name](tree)]
-    assert lowered == rule.paths("Implemented in")
+    lowered = {path for path, tree in _modules().items() if CRITERIA[name](tree)}
+    assert lowered - READERS.get(name, set()) == set(rule.paths("Implemented in"))
 
 
 def test_what_takes_transitions_calls_the_one_lowering() -> None:
