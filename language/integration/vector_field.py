@@ -30,7 +30,6 @@ from language.ir.program import Variable, mode_variable
 from language.lowering.action_stages import (
     StageBindings,
     action_variables,
-    lower_transition,
     stage_reads,
     transition_stages,
 )
@@ -51,7 +50,6 @@ from language.lowering.guard_variable_names import (
     mode_bindings,
 )
 from language.lowering.program_builder import equation_variables
-from language.lowering.transition_choice import choose_by_priority
 from language.model.automaton import Automaton, Balance, Mode, Transition
 from language.model.region_queries import (
     possible_balances,
@@ -207,28 +205,6 @@ def any_guard_condition(
     for level in level_change_conditions(field.automaton):
         result = Binary("or", result, level)
     return result
-
-
-def lower_single_region_step(
-    field: VectorField, mode: Mode, enabled: Mapping[int, Expr], extra_effects: Mapping[int, Block]
-) -> Block:
-    """Return one micro-step of an automaton without parallel regions.
-
-    The enabled transition with the smallest priority runs its actions (rule 6). The change of modes
-    sets the mode and runs the operations of `extra_effects`. `enabled` and `extra_effects` have the
-    index of a transition in the mode as key; transitions may be absent from `extra_effects`.
-    """
-    automaton = field.automaton
-    fire = {
-        k: lower_transition(
-            automaton,
-            transition_stages(automaton, transition),
-            stage_bindings(field, [automaton.target_mode(transition)]),
-            (set_target_mode(field, transition), *extra_effects.get(k, ())),
-        )
-        for k, transition in enumerate(mode.transitions)
-    }
-    return choose_by_priority(mode, enabled, fire)
 
 
 def stage_bindings(field: VectorField, targets: Iterable[Mode]) -> StageBindings:

@@ -28,9 +28,8 @@ EXECUTED = ("exit", "reset", "entry")
 """The attributes of modes and transitions that hold actions of a transition."""
 TAKERS = {
     "language/charts/micro_step.py": "a chart",
-    "language/integration/vector_field.py": "a continuous automaton, and a run in a tick",
     "language/programs/engine_blocks.py": "the start of a continuous automaton",
-    "language/programs/parallel_regions.py": "regions of a continuous automaton",
+    "language/programs/continuous_micro_step.py": "a continuous automaton, and a run in a tick",
     "language/programs/sampled_program.py": "the start of a sampled automaton",
     "language/programs/sampled_transitions.py": "a sampled automaton, its regions, a rewind",
 }

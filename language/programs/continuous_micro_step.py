@@ -1,12 +1,12 @@
-"""Micro-steps of parallel regions: all select on one snapshot, then all act (rules 3 and 14).
+"""Micro-steps of continuous automata, and of the model of a run in a tick (rules 3, 6 and 14).
 
-An automaton without regions beside its chart uses `lower_single_region_step` of
-language/integration/vector_field.py instead, which resets and enters at once.
+Without parallel regions the transition that is chosen acts at once. Parallel regions all select on
+one snapshot, then all act.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from language.integration.vector_field import (
@@ -16,9 +16,13 @@ from language.integration.vector_field import (
     stage_bindings,
 )
 from language.ir.ops import Assign, Block, Expr, Op, RunBlock, integer
-from language.lowering.action_stages import common_stages, lower_transition, select_blocks
+from language.lowering.action_stages import (
+    common_stages,
+    lower_transition,
+    select_blocks,
+    transition_stages,
+)
 from language.lowering.expressions import choose_by_mode
-from language.lowering.guard_variable_names import guard_slot
 from language.lowering.transition_choice import choose_by_priority
 from language.model.automaton import Mode, Transition
 from language.model.region_queries import transitions_of_regions
@@ -29,34 +33,55 @@ class TransitionSelection:
     """The names and conditions by which a micro-step selects transitions.
 
     `selected_variable` gives the variable of a region, `number_of` the number of a transition.
-    `enabled_condition` gives the condition of a transition from the slot of its guard;
-    `after_switch` gives further operations after the transition has switched the mode.
+    `enabled` gives the conditions of the transitions of a mode by their index; `after_switch` gives
+    further operations after a transition has switched the mode.
     """
 
     block_prefix: str
     selected_variable: Callable[[str], str]
     number_of: Callable[[Transition], int]
-    enabled_condition: Callable[[Transition, str], Expr]
+    enabled: Callable[[Mode], Mapping[int, Expr]]
     after_switch: Callable[[Transition], Block]
 
 
-def parallel_blocks(field: VectorField, selection: TransitionSelection) -> dict[str, Block]:
-    """Return `<prefix>_<region>_<mode>` of the parallel regions, and `commit_<prefix>`.
+def micro_step_blocks(field: VectorField, selection: TransitionSelection) -> dict[str, Block]:
+    """Return `<prefix>_<mode>` of each mode: one micro-step while the mode of the chart is active.
 
-    The former select a transition of a mode, the latter performs the selected ones of all regions.
-    The prefix of the selection separates the blocks of a run from those of its automaton.
+    With parallel regions there are also `<prefix>_<region>_<mode>`, which select a transition of a
+    mode, and `commit_<prefix>`, which performs the selected ones of all regions. The prefix
+    separates the blocks of a run from those of its automaton.
     """
+    automaton, prefix = field.automaton, selection.block_prefix
+    if not automaton.regions:
+        modes = automaton.modes.values()
+        return {f"{prefix}_{mode.name}": _single_step(field, mode, selection) for mode in modes}
     blocks: dict[str, Block] = {}
-    for region in field.automaton.regions:
+    for region in automaton.regions:
         for mode in region.modes.values():
-            blocks[f"{selection.block_prefix}_{mode.label}"] = _select_transition(
-                mode, selection, field.key_prefix
-            )
-    blocks[f"commit_{selection.block_prefix}"] = _commit_block(field, selection)
+            chosen = _select_transition(mode, selection, field.key_prefix)
+            blocks[f"{prefix}_{mode.label}"] = chosen
+    blocks[f"commit_{prefix}"] = _commit_block(field, selection)
+    for mode in automaton.modes.values():
+        blocks[f"{prefix}_{mode.name}"] = _parallel_step(field, mode, selection)
     return blocks
 
 
-def lower_parallel_step(field: VectorField, mode: Mode, selection: TransitionSelection) -> Block:
+def _single_step(field: VectorField, mode: Mode, selection: TransitionSelection) -> Block:
+    """Return one micro-step of an automaton without parallel regions."""
+    automaton = field.automaton
+    fire = {
+        k: lower_transition(
+            automaton,
+            transition_stages(automaton, transition),
+            stage_bindings(field, [automaton.target_mode(transition)]),
+            (set_target_mode(field, transition), *selection.after_switch(transition)),
+        )
+        for k, transition in enumerate(mode.transitions)
+    }
+    return choose_by_priority(mode, selection.enabled(mode), fire)
+
+
+def _parallel_step(field: VectorField, mode: Mode, selection: TransitionSelection) -> Block:
     """Return one micro-step of all regions while `mode` of the chart is active.
 
     All selections are cleared; the mode and the active modes of its own parallel regions select;
@@ -78,13 +103,12 @@ def lower_parallel_step(field: VectorField, mode: Mode, selection: TransitionSel
 
 def _select_transition(mode: Mode, selection: TransitionSelection, prefix: str) -> Block:
     """Return the operations that select the enabled transition with the smallest priority."""
-    enabled: dict[int, Expr] = {}
+    variable = selection.selected_variable(mode.region)
     taken: dict[int, Block] = {}
     for k, transition in enumerate(mode.transitions):
-        variable, number = selection.selected_variable(mode.region), selection.number_of(transition)
-        enabled[k] = selection.enabled_condition(transition, guard_slot(mode.region, k))
-        taken[k] = (Assign(variable, integer(number), prefix + transition.key),)
-    return choose_by_priority(mode, enabled, taken)
+        number = integer(selection.number_of(transition))
+        taken[k] = (Assign(variable, number, prefix + transition.key),)
+    return choose_by_priority(mode, selection.enabled(mode), taken)
 
 
 def _commit_block(field: VectorField, selection: TransitionSelection) -> Block:
