@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 
 import pytest
 
+from language.lowering.sensor_program import sensor_program
 from tests.docs.test_rule_citations import ROOT, SEMANTICS, leaf_rules
 
 LOWERING = (
@@ -118,6 +120,24 @@ def test_a_rule_is_lowered_in_its_home_alone(name: str) -> None:
     (rule,) = [rule for rule in leaf_rules() if (rule.page, rule.name) == (SEMANTICS, name)]
     lowered = {path for path, tree in _modules().items() if CRITERIA[name](tree)}
     assert lowered - READERS.get(name, set()) == set(rule.paths("Implemented in"))
+
+
+def test_the_numerics_of_sensors_are_in_no_driver() -> None:
+    """The engine runs the blocks of the home of rule 19c, the driver in C prints them."""
+    driver = (ROOT / "codegen/templates/simulator/run_driver.c.jinja").read_text("utf-8")
+    printed = re.findall(r"{{ sensor_formulas\.(\w+) }}", driver)
+    assert printed == list(sensor_program().blocks) == ["decay", "lag", "quantise"]
+    assert not re.search(r"\b(ha_exp|exp|floor)\(", driver)
+    engine = ast.parse((ROOT / "engine/simulation/sensors.py").read_text("utf-8"))
+    names = {node.module for node in ast.walk(engine) if isinstance(node, ast.ImportFrom)}
+    assert "language.lowering.sensor_program" in names
+    assert "language.numerics.evaluate" not in names
+    assert not any(
+        alias.name == "math"
+        for n in ast.walk(engine)
+        if isinstance(n, ast.Import)
+        for alias in n.names
+    )
 
 
 def test_what_takes_transitions_calls_the_one_lowering() -> None:
