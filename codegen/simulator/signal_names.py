@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from codegen.emit.c_expression import CNameMap, emit_expression
@@ -10,6 +10,7 @@ from codegen.emit.c_names import CNames
 from language.ir.number_type import NumberType
 from language.ir.ops import Assign
 from language.ir.program import Program, unqualified_name
+from language.lowering.sensor_program import LAST_INPUT, LAST_OUTPUT, sensor_program
 from language.programs.system_program import SimulationAssembly, output_variables
 
 INSTANCE_NAME = "i_{}"
@@ -83,26 +84,39 @@ def emit_wire_formula(assembly: SimulationAssembly, block: str, c_names: CNameMa
 
 
 @dataclass(frozen=True)
-class TimeNameMap:
-    """The C text of names in a formula of time: every name is the variable `now`."""
+class LocalNameMap:
+    """The C text of names that are local variables and members of a function of the driver."""
 
+    place_of: Callable[[str], str]
     number: NumberType = "float64"
 
     def __call__(self, name: str) -> str:
-        """Return the C text of the time."""
-        return "now"
+        """Return the C text of a name."""
+        return self.place_of(name)
 
     def integer_constant(self, name: str, number: int) -> str:
-        """Return a whole number that stands beside the time, as a decimal; `name` is ignored."""
+        """Return a whole number that stands beside a name, as a decimal; `name` is ignored."""
         return repr(number)
 
     def is_unsigned(self, name: str) -> bool:
-        """Return False: the time is a real."""
+        """Return False: all are reals."""
         return False
 
     def is_volatile(self, name: str) -> bool:
-        """Return False: nobody changes the time during a step."""
+        """Return False: nobody changes them during a step."""
         return False
+
+
+def sensor_formulas() -> dict[str, str]:
+    """Return the C text of the blocks of the Program of sensors.
+
+    The filter `lag` is a pointer to its state; all other names are local variables.
+    """
+    places = {LAST_INPUT: "lag->input", LAST_OUTPUT: "lag->value"}
+    names = LocalNameMap(lambda name: places.get(name, unqualified_name(name)))
+    blocks = sensor_program().blocks.items()
+    assigned = [(block, op) for block, (op,) in blocks if isinstance(op, Assign)]
+    return {block: emit_expression(op.value, names) for block, op in assigned}
 
 
 def column_positions(assembly: SimulationAssembly) -> list[int]:

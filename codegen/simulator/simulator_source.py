@@ -24,10 +24,11 @@ from codegen.simulator.instance_module import (
 )
 from codegen.simulator.signal_names import (
     INSTANCE_NAME,
+    LocalNameMap,
     SignalNameMap,
-    TimeNameMap,
     emit_wire_formula,
     row_width,
+    sensor_formulas,
 )
 from codegen.simulator.simd_batch import LANES
 from codegen.toolchain.templates import product_version, render
@@ -116,6 +117,7 @@ def _driver_context(
         "title": "A run",
         "instances": instances,
         "sensors": sensors,
+        "sensor_formulas": sensor_formulas(),
         "seen": [seen for part in instances for flag in part["flags"] for seen, _ in flag["seen"]],
         "width": row_width(assembly),
         "lanes": LANES if any(one["has_simd"] for one in instances) else 0,
@@ -184,7 +186,7 @@ def _course_context(assembly: SimulationAssembly, course: InputTrajectory) -> di
         "low": repr(float(course.delay - Fraction(high))),
         "column": assembly.inputs.index(course.name),
         "formulas": [
-            (number, emit_wire_formula(assembly, block, TimeNameMap()))
+            (number, emit_wire_formula(assembly, block, LocalNameMap(lambda _: "now")))
             for number, block in course.formulas
         ],
     }

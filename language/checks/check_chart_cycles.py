@@ -202,14 +202,7 @@ def _is_constant_in_tick(
     A variable can change if it is a mode variable, has one of the given prefixes, or an entry, exit
     or reset assigns to it.
     """
-    written: set[str] = set()
-    for mode in automaton.all_modes:
-        for formulas in (
-            mode.entry,
-            mode.exit,
-            *(transition.reset for transition in mode.transitions),
-        ):
-            written.update(formulas)
+    written = {n for mode in automaton.all_modes for part in mode.jump_assignments for n in part}
     return not any(
         name.startswith(("mode.", *changing_prefixes)) or name.partition(".")[2] in written
         for name in variables

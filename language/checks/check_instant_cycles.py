@@ -16,7 +16,7 @@ from language.ir.analysis_cache import cache_on_owner
 from language.ir.ops import Expr, Unary
 from language.lowering.constants import evaluate_exactly
 from language.lowering.event_tolerance import is_instantaneous
-from language.model.automaton import Automaton, Mode, Transition
+from language.model.automaton import Automaton, Transition
 from language.model.graph_algorithms import strongly_connected_components
 from language.smt.bound_propagation import is_disproved_by_bounds
 from language.smt.query_engine import QueryEngine, Witness
@@ -255,14 +255,8 @@ def _may_be_disturbed(automaton: Automaton, cycle: Cycle, witness: Witness) -> b
     if any(name.startswith("mode.") for name in witness.valuation):
         return True
     others = (m for m in automaton.all_modes if m.region != cycle[0].region)
-    written = {name for mode in others for name in _assigned_names(mode)}
+    written = {name for mode in others for part in mode.jump_assignments for name in part}
     return any(name.partition(".")[2] in written for name in witness.valuation)
-
-
-def _assigned_names(mode: Mode) -> Iterator[str]:
-    """Yield the names that entry, exit and resets of a mode assign."""
-    for formulas in (mode.entry, mode.exit, *(transition.reset for transition in mode.transitions)):
-        yield from formulas
 
 
 def _format_cycle(cycle: Cycle) -> str:

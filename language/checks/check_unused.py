@@ -99,10 +99,8 @@ def _check_unwritten(automaton: Automaton, problems: Problems) -> None:
 
 def _written_names(automaton: Automaton, mode: Mode) -> Iterator[str]:
     """Yield the names that a mode or its transitions write, observers and runs included."""
-    for group in (mode.update, mode.entry, mode.exit, mode.flow):
+    for group in (mode.update, mode.flow, *mode.jump_assignments):
         yield from group
-    for transition in mode.transitions:
-        yield from transition.reset
     if mode.observer:
         yield from mode.observer.states
     if mode.run and automaton.model:

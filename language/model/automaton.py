@@ -180,6 +180,16 @@ class Mode:
         name = self.name if self.region == CHART else f"{self.region}_{self.name}"
         return name.replace(".", "_")
 
+    @property
+    def has_entry_or_exit(self) -> bool:
+        """Whether the mode has entry or exit actions."""
+        return bool(self.entry or self.exit)
+
+    @property
+    def jump_assignments(self) -> tuple[Mapping[str, Formula], ...]:
+        """The resets of its transitions, its entry and its exit, each by variable."""
+        return (*(transition.reset for transition in self.transitions), self.entry, self.exit)
+
 
 @dataclass(frozen=True)
 class Region:

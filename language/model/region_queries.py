@@ -11,7 +11,7 @@ import dataclasses
 from collections.abc import Iterable, Iterator, Mapping
 
 from language.ir.analysis_cache import cache_on_owner
-from language.model.automaton import Balance, Mode, Region, Transition
+from language.model.automaton import Automaton, Balance, Mode, Region, Transition
 from language.model.declaration import Formula
 
 
@@ -87,6 +87,12 @@ def watched_transitions(mode: Mode) -> Iterator[Transition]:
     for region in mode.parallel_regions:
         for other in region.modes.values():
             yield from other.transitions
+
+
+def transitions_of_regions(automaton: Automaton) -> list[Transition]:
+    """Return the transitions of the innermost modes of all regions, region by region."""
+    modes = (mode for region in automaton.all_regions for mode in region.modes.values())
+    return [transition for mode in modes for transition in mode.transitions]
 
 
 @cache_on_owner

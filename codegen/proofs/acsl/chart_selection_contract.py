@@ -28,6 +28,7 @@ from language.lowering.event_queue import CURRENT_EVENT
 from language.lowering.expressions import lower_expression
 from language.lowering.transition_metadata import wait_ticks
 from language.model.automaton import Mode, Transition
+from language.model.region_queries import transitions_by_priority
 from language.model.statechart import ChartNode
 
 
@@ -103,8 +104,8 @@ class Choice:
     def _ordered(self, nodes: Iterable[ChartNode]) -> Iterator[tuple[ChartNode, Transition]]:
         """Yield the transitions of some modes, each mode's by priority."""
         for node in nodes:
-            ways = enumerate(self.words.charting.transitions_of(node))
-            ordered = sorted(ways, key=lambda pair: (pair[1].priority or 0, pair[0]))
+            mode = self.words.charting.mode_of(node)
+            ordered = transitions_by_priority(mode) if mode else []
             yield from ((node, transition) for _, transition in ordered)
 
     def _first(self, ways: Iterable[tuple[ChartNode, Transition]], none: str) -> str:

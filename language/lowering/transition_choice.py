@@ -1,0 +1,89 @@
+"""Choice of a transition of a mode: guards, waits and priority (rules 3a and 4b)."""
+
+from __future__ import annotations
+
+from collections import ChainMap
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from language.ir.ops import Assign, Block, Branch, Compare, Count, Expr, Op, Ref, Value, integer
+from language.ir.program import TransitionInfo
+from language.lowering.edge_detection import detect_edges, guard_memory_bindings
+from language.lowering.expressions import NameBindings, lower_expression
+from language.lowering.transition_metadata import wait_ticks
+from language.model.automaton import Automaton, Mode, Transition
+from language.model.region_queries import transitions_by_priority
+
+ALWAYS_ENABLED = Value(True)
+"""The condition of a transition that is taken if no other one is enabled."""
+
+
+def choose_by_priority(
+    mode: Mode, enabled: Mapping[int, Expr], effects: Mapping[int, Block]
+) -> Block:
+    """Return the operations of the enabled transition with the smallest priority (rule 3a).
+
+        if enabled_1: effects_1 else if enabled_2: effects_2 ...    (in the order of priority)
+
+    `enabled` and `effects` map the index of a transition in the mode to its condition and its
+    operations. A transition with the condition `ALWAYS_ENABLED` is taken without a test, and those
+    after it are left out. If none is enabled, nothing happens.
+    """
+    ops: Block = ()
+    for k, _ in reversed(transitions_by_priority(mode)):
+        ops = effects[k] if enabled[k] == ALWAYS_ENABLED else (Branch(enabled[k], effects[k], ops),)
+    return ops
+
+
+def without_last_test(mode: Mode, enabled: Mapping[int, Expr]) -> dict[int, Expr]:
+    """Return the conditions by index, of which one is known to hold.
+
+    The last transition in the order of priority is then enabled if no other one is.
+    """
+    last = {k: ALWAYS_ENABLED for k, _ in transitions_by_priority(mode)[-1:]}
+    return {**enabled, **last}
+
+
+@dataclass(frozen=True)
+class SampledChoice:
+    """The choice of a transition of a mode of a sampled automaton.
+
+    `edges` detect edges and `counts` count the waits in a tick. `restarts` replace `counts` in a
+    later micro-step of the tick: a wait that begins there has the count 0. `enabled` are the
+    conditions of the transitions by their index in the mode.
+    """
+
+    edges: Block
+    counts: Block
+    restarts: Block
+    enabled: Mapping[int, Expr]
+
+
+def lower_sampled_choice(
+    automaton: Automaton,
+    mode: Mode,
+    known: NameBindings,
+    infos: Sequence[TransitionInfo],
+    condition_of: Callable[[Transition, Expr], Expr] = lambda transition, guard: guard,
+) -> SampledChoice:
+    """Return the guards and waits of a mode's transitions (rule 4b).
+
+    `known` are the names with equations, `infos` the data of the transitions. `condition_of` gives
+    the condition of a transition from its guard. The first tick with a true condition counts 1, so
+    a wait of N ticks is over when the counter exceeds N.
+    """
+    guard_names = ChainMap(guard_memory_bindings(automaton, mode), dict(known))
+    counts: list[Op] = []
+    restarts: list[Op] = []
+    enabled: dict[int, Expr] = {}
+    for k, transition in transitions_by_priority(mode):
+        info = infos[k]
+        enabled[k] = condition_of(transition, lower_expression(transition.when.tree, guard_names))
+        if info.timer:
+            timer, key = Ref(info.timer), f"{automaton.name} {transition.when.key}"
+            counts.append(Count(info.timer, enabled[k], info.timer_limit, key))
+            begin = Branch(Compare("==", timer, integer(0)), (Assign(info.timer, integer(1)),))
+            restarts.append(Branch(enabled[k], (begin,), (Assign(info.timer, integer(0)),)))
+            enabled[k] = Compare(">", timer, wait_ticks(info))
+    edges = tuple(detect_edges(automaton, mode, known))
+    return SampledChoice(edges, tuple(counts), tuple(restarts), enabled)
