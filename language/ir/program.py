@@ -153,6 +153,15 @@ class TransitionInfo:
     max_ticks: int = 0
 
     @property
+    def guard_key(self) -> str:
+        """The key path of the operation that evaluates the guard for a variable or a counter.
+
+        The guard of a sampled transition without a wait is instead the condition of the branch
+        that holds the operation with `key`.
+        """
+        return f"{self.key}.when"
+
+    @property
     def timer_limit(self) -> int:
         """The value at which the wait counter saturates.
 

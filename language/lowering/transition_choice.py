@@ -6,16 +6,13 @@ from collections import ChainMap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from language.ir.ops import Assign, Block, Branch, Compare, Count, Expr, Op, Ref, Value, integer
+from language.ir.ops import Assign, Block, Branch, Compare, Count, Expr, Op, Ref, integer
 from language.ir.program import TransitionInfo
 from language.lowering.edge_detection import detect_edges, guard_memory_bindings
 from language.lowering.expressions import NameBindings, lower_expression
 from language.lowering.transition_metadata import wait_ticks
 from language.model.automaton import Automaton, Mode, Transition
 from language.model.region_queries import transitions_by_priority
-
-ALWAYS_ENABLED = Value(True)
-"""The condition of a transition that is taken if no other one is enabled."""
 
 
 def choose_by_priority(
@@ -26,22 +23,21 @@ def choose_by_priority(
         if enabled_1: effects_1 else if enabled_2: effects_2 ...    (in the order of priority)
 
     `enabled` and `effects` map the index of a transition in the mode to its condition and its
-    operations. A transition with the condition `ALWAYS_ENABLED` is taken without a test, and those
-    after it are left out. If none is enabled, nothing happens.
+    operations. A transition without a condition is taken without a test, and those after it are
+    left out. If none is enabled, nothing happens.
     """
     ops: Block = ()
     for k, _ in reversed(transitions_by_priority(mode)):
-        ops = effects[k] if enabled[k] == ALWAYS_ENABLED else (Branch(enabled[k], effects[k], ops),)
+        ops = (Branch(enabled[k], effects[k], ops),) if k in enabled else effects[k]
     return ops
 
 
 def without_last_test(mode: Mode, enabled: Mapping[int, Expr]) -> dict[int, Expr]:
-    """Return the conditions by index, of which one is known to hold.
+    """Return the conditions that need a test, by index, if one of `enabled` is known to hold.
 
     The last transition in the order of priority is then enabled if no other one is.
     """
-    last = {k: ALWAYS_ENABLED for k, _ in transitions_by_priority(mode)[-1:]}
-    return {**enabled, **last}
+    return {k: enabled[k] for k, _ in transitions_by_priority(mode)[:-1]}
 
 
 @dataclass(frozen=True)
@@ -80,8 +76,8 @@ def lower_sampled_choice(
         info = infos[k]
         enabled[k] = condition_of(transition, lower_expression(transition.when.tree, guard_names))
         if info.timer:
-            timer, key = Ref(info.timer), f"{automaton.name} {transition.when.key}"
-            counts.append(Count(info.timer, enabled[k], info.timer_limit, key))
+            timer = Ref(info.timer)
+            counts.append(Count(info.timer, enabled[k], info.timer_limit, info.guard_key))
             begin = Branch(Compare("==", timer, integer(0)), (Assign(info.timer, integer(1)),))
             restarts.append(Branch(enabled[k], (begin,), (Assign(info.timer, integer(0)),)))
             enabled[k] = Compare(">", timer, wait_ticks(info))
