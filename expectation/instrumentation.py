@@ -9,13 +9,12 @@ A chart also records the active modes after each micro-step.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from expectation.mcdc import MAX_CONDITIONS, Decision, match_conditions
 from language.ir.ops import (
     Assign,
     Binary,
-    Block,
     Branch,
     Count,
     Expr,
@@ -29,6 +28,7 @@ from language.ir.ops import (
     integer,
 )
 from language.ir.program import Program, Variable, mode_variable
+from language.ir.rewrite_ops import map_operations
 
 GUARD_READ_BLOCK = "read_guards"
 """The block that evaluates and records the guards of the active modes, without other effects."""
@@ -65,15 +65,15 @@ def instrument(program: Program, decisions: Iterable[Decision]) -> InstrumentedP
     if program.period is None:
         guards = {n: b for n, b in blocks.items() if n.startswith(GUARDS_PREFIX)}
         blocks |= {
-            PROBED_PREFIX + n: _map_operations(b, inserter.insert_after_assignment)
+            PROBED_PREFIX + n: map_operations(b, inserter.insert_after_assignment)
             for n, b in guards.items()
         }
         for name, block in program.blocks.items():
             if name.startswith("jump"):
-                blocks[name] = _map_operations(block, _redirect_to_probed)
+                blocks[name] = map_operations(block, _redirect_to_probed)
         blocks[GUARD_READ_BLOCK] = tuple(_guard_reads(program.blocks["evaluate_guards"]))
     else:
-        blocks = {n: _map_operations(b, inserter.insert_before_firing) for n, b in blocks.items()}
+        blocks = {n: map_operations(b, inserter.insert_before_firing) for n, b in blocks.items()}
     arrays = {key: inserter.arrays[key] for key in inserter.stored}
     sizes = {arrays[d.key]: 1 << len(d.conditions) for d in inserter.decisions if d.key in arrays}
     for region, mode in program.mode_variables().items() if COMMIT_BLOCK in blocks else ():
@@ -145,21 +145,6 @@ class _ProbeInserter:
             index = Binary("+", index, Select(part, integer(1 << k), integer(0)))
         self.stored[decision.key] = None
         yield Store(self.arrays[decision.key], index, Value(True))
-
-
-def _map_operations(block: Block, change: Callable[[Op], Iterator[Op]]) -> Block:
-    """Return a block whose operations, innermost first, are each replaced by a sequence."""
-    found: list[Op] = []
-    for op in block:
-        match op:
-            case Branch(condition, then, other):
-                op = Branch(
-                    condition, _map_operations(then, change), _map_operations(other, change)
-                )
-            case Switch(selector, cases):
-                op = Switch(selector, tuple((k, _map_operations(b, change)) for k, b in cases))
-        found += change(op)
-    return tuple(found)
 
 
 def _redirect_to_probed(op: Op) -> Iterator[Op]:

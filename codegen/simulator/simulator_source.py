@@ -34,7 +34,7 @@ from codegen.simulator.simd_batch import LANES
 from codegen.toolchain.templates import product_version, render
 from language.ir.number_type import NumberType
 from language.ir.program import ENGINE_BLOCKS, STEP_INTERFACE, Program, unqualified_name
-from language.ir.traversal import names_used
+from language.ir.traversal import called_functions
 from language.lowering.program_builder import finalise_program
 from language.model.system import Sensor
 from language.programs.system_program import (
@@ -109,8 +109,7 @@ def _driver_context(
     ]
     row_names = dataclasses.replace(signal_names, is_row=True)
     sensors = [_sensor_context(sensor, signal_names) for sensor in assembly.sensors.values()]
-    wired = names_used(assembly.wires.blocks.values())
-    called = {name for name in wired if name.startswith("call ")}
+    called = called_functions(assembly.wires.blocks.values())
     has_lag = any(sensor.lag for sensor in assembly.sensors.values())
     return {
         "version": product_version(),
