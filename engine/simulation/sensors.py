@@ -10,13 +10,13 @@ from fractions import Fraction
 import numpy as np
 
 from engine.interpreter.interpreter import Interpreter
+from language.lowering.program_builder import FORMULA_RESULT
 from language.lowering.sensor_program import (
     ELAPSED,
     INPUT,
     LAST_INPUT,
     LAST_OUTPUT,
     RESOLUTION,
-    RESULT,
     TIME_CONSTANT,
     sensor_program,
 )
@@ -71,7 +71,7 @@ class FirstOrderLag:
             numerics.run("decay")
             self._elapsed = elapsed
         numerics.run("lag")
-        return float(numerics.get(RESULT))
+        return float(numerics.get(FORMULA_RESULT))
 
 
 def philox_of(seed: int, name: str) -> np.random.Philox:
@@ -153,4 +153,4 @@ class SensorRun:
             return value
         self._numerics.set(INPUT, value)
         self._numerics.run("quantise")
-        return float(self._numerics.get(RESULT))
+        return float(self._numerics.get(FORMULA_RESULT))

@@ -145,7 +145,7 @@ def _enabled_condition(
     context: ChartContext, node: ChartNode, transition: Transition, guard: Expr
 ) -> Expr:
     """Return the condition of a transition: completion, guard, or event and guard."""
-    event = event_condition(context.chart, transition)
+    event = event_condition(context.chart, transition, context.queue_capacity)
     if transition.is_completion:
         return is_complete(context.chart, node, "memory.mode")
     if event is None:

@@ -14,7 +14,7 @@ A variable is called `group.name`. The group gives its meaning and its storage:
     axis      points of an axis of a table
     innovation  measurement minus its prediction, of an observer
     is_new    whether a measurement is new in this tick
-    signal    value that a connection of a system reads
+    signal    value that a connection or a sensor of a system reads
     work      local variable of one call
 """
 

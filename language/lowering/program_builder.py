@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Mapping
+from fractions import Fraction
 
 from language.expressions.units import Dimension
 from language.ir.annotate_types import annotate_types
@@ -43,6 +44,8 @@ from language.typecheck.types import EnumType, IntType
 
 INACTIVE = "inactive"
 """The name of the mode of a region inside a mode while that mode is not active."""
+FORMULA_RESULT = "work.value"
+"""The variable that a block of a Program of formulas sets."""
 
 
 def input_variables(automaton: Automaton, group: str) -> list[Variable]:
@@ -265,6 +268,30 @@ def assemble_program(
         blocks=blocks,
         defaults=input_defaults(automaton),
     )
+
+
+def formula_program(
+    name: str, variables: Iterable[Variable], blocks: Mapping[str, Block]
+) -> Program:
+    """Return a Program without modes, of which each block is run alone and computes in float64.
+
+    A block sets FORMULA_RESULT, which is added to `variables`, or one of these.
+    """
+    program = Program(
+        name=name,
+        number_type="float64",
+        period=None,
+        major_step=Fraction(1),
+        constants=(),
+        variables=(*variables, Variable(FORMULA_RESULT, "real")),
+        outputs=(),
+        modes=(),
+        transitions=(),
+        faults=(),
+        functions=(),
+        blocks=blocks,
+    )
+    return finalise_program(program, tuple(blocks))
 
 
 def mode_infos(region: Region) -> tuple[ModeInfo, ...]:

@@ -2,15 +2,14 @@
 
 Its blocks are one assignment each, so that a driver can also print them as expressions:
 
-    decay       `sensor.decay`, the part of a deviation that rests after `sensor.elapsed`
-    lag         `sensor.result`, the filtered input
-    quantise    `sensor.result`, the nearest multiple of the resolution
+    decay       `signal.decay`, the part of a deviation that rests after `signal.elapsed`
+    lag         the result, the filtered input
+    quantise    the result, the nearest multiple of the resolution
 """
 
 from __future__ import annotations
 
 import sys
-from fractions import Fraction
 from functools import cache
 
 from language.ir.ops import (
@@ -30,13 +29,13 @@ from language.ir.ops import (
     subtract,
 )
 from language.ir.program import Program, Variable
-from language.lowering.program_builder import finalise_program
+from language.lowering.program_builder import FORMULA_RESULT, formula_program
 
-DECAY, RESULT = "sensor.decay", "sensor.result"
-"""The variables that the blocks set."""
-INPUT, LAST_INPUT, LAST_OUTPUT = "sensor.input", "sensor.last_input", "sensor.last_output"
+DECAY = "signal.decay"
+"""The part of a deviation that rests; the block `decay` sets it."""
+INPUT, LAST_INPUT, LAST_OUTPUT = "signal.input", "signal.last_input", "signal.last_output"
 """The input, the input of the last point and the output there [SI]."""
-ELAPSED, TIME_CONSTANT, RESOLUTION = "sensor.elapsed", "sensor.time_constant", "sensor.resolution"
+ELAPSED, TIME_CONSTANT, RESOLUTION = "signal.elapsed", "signal.time_constant", "signal.resolution"
 """The time since the last point [s], the time constant of the filter [s] and the resolution."""
 
 
@@ -45,25 +44,11 @@ def sensor_program() -> Program:
     """Return the Program of the filter and the quantisation, in float64."""
     blocks: dict[str, Block] = {
         "decay": (Assign(DECAY, _decay()),),
-        "lag": (Assign(RESULT, _lagged()),),
-        "quantise": (Assign(RESULT, _quantised()),),
+        "lag": (Assign(FORMULA_RESULT, _lagged()),),
+        "quantise": (Assign(FORMULA_RESULT, _quantised()),),
     }
-    names = (DECAY, RESULT, INPUT, LAST_INPUT, LAST_OUTPUT, ELAPSED, TIME_CONSTANT, RESOLUTION)
-    program = Program(
-        name="sensors",
-        number_type="float64",
-        period=None,
-        major_step=Fraction(1),
-        constants=(),
-        variables=tuple(Variable(name, "real") for name in names),
-        outputs=(),
-        modes=(),
-        transitions=(),
-        faults=(),
-        functions=(),
-        blocks=blocks,
-    )
-    return finalise_program(program, tuple(blocks), keep=(RESULT,))
+    names = (DECAY, INPUT, LAST_INPUT, LAST_OUTPUT, ELAPSED, TIME_CONSTANT, RESOLUTION)
+    return formula_program("sensors", [Variable(name, "real") for name in names], blocks)
 
 
 def _decay() -> Expr:
