@@ -55,10 +55,9 @@ def _check_events(automaton: Automaton, problems: Problems) -> None:
     event that nothing raises is left to the check of dead transitions if a transition reacts to
     such events only.
     """
-    transitions = [each for mode in automaton.all_modes for each in mode.transitions]
     possible = possible_events(automaton)
-    heard = {name for transition in transitions for name in transition.events}
-    dead = [each for each in transitions if not possible & {*each.events}]
+    heard = {name for transition in automaton.all_transitions for name in transition.events}
+    dead = [each for each in automaton.all_transitions if not possible & {*each.events}]
     reported = {name for transition in dead for name in transition.events}
     for event in automaton.statechart.events.values() if automaton.statechart else ():
         name = event.name

@@ -295,6 +295,11 @@ class Automaton:
         return (*inner, *self.superstates)
 
     @cached_property
+    def all_transitions(self) -> tuple[Transition, ...]:
+        """The transitions of `all_modes`, mode by mode."""
+        return tuple(transition for mode in self.all_modes for transition in mode.transitions)
+
+    @cached_property
     def modes_by_key(self) -> Mapping[str, Mode]:
         """All modes, those of all regions and the superstates, by key path."""
         return {mode.key: mode for mode in self.all_modes}

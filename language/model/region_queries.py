@@ -11,7 +11,7 @@ import dataclasses
 from collections.abc import Iterable, Iterator, Mapping
 
 from language.ir.analysis_cache import cache_on_owner
-from language.model.automaton import Automaton, Balance, Mode, Region, Transition
+from language.model.automaton import Balance, Mode, Region, Transition
 from language.model.declaration import Formula
 
 
@@ -89,12 +89,6 @@ def watched_transitions(mode: Mode) -> Iterator[Transition]:
             yield from other.transitions
 
 
-def transitions_of_regions(automaton: Automaton) -> list[Transition]:
-    """Return the transitions of the innermost modes of all regions, region by region."""
-    modes = (mode for region in automaton.all_regions for mode in region.modes.values())
-    return [transition for mode in modes for transition in mode.transitions]
-
-
 @cache_on_owner
 def transitions_by_priority(mode: Mode) -> list[tuple[int, Transition]]:
     """Return pairs of index and transition of a mode, in ascending order of `priority` (rule 3a).
@@ -104,6 +98,15 @@ def transitions_by_priority(mode: Mode) -> list[tuple[int, Transition]]:
     """
     pairs = list(enumerate(mode.transitions))
     return sorted(pairs, key=lambda pair: (pair[1].priority or 0, pair[0]))
+
+
+def earlier_by_priority(mode: Mode, transition: Transition) -> list[Transition]:
+    """Return the transitions of a mode that come before one of them by priority (rule 3a).
+
+    Raises ValueError if the transition does not belong to the mode.
+    """
+    ordered = [other for _, other in transitions_by_priority(mode)]
+    return ordered[: ordered.index(transition)]
 
 
 def attach_regions(modes: Mapping[str, Mode], regions: tuple[Region, ...]) -> dict[str, Mode]:

@@ -25,7 +25,6 @@ from language.lowering.action_stages import (
 from language.lowering.expressions import choose_by_mode
 from language.lowering.transition_choice import choose_by_priority
 from language.model.automaton import Mode, Transition
-from language.model.region_queries import transitions_of_regions
 
 
 @dataclass(frozen=True)
@@ -119,7 +118,7 @@ def _commit_block(field: VectorField, selection: TransitionSelection) -> Block:
     automaton = field.automaton
     selected = [
         (each, (selection.selected_variable(each.region), selection.number_of(each)))
-        for each in transitions_of_regions(automaton)
+        for each in automaton.all_transitions
     ]
     moved = select_blocks(
         (by, (set_target_mode(field, each), *selection.after_switch(each))) for each, by in selected

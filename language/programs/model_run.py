@@ -280,12 +280,11 @@ def _settings_key(run: ModelRun) -> tuple[object, ...]:
 def _switch_blocks(field: VectorField, problems: Problems) -> dict[str, Block]:
     """Return `switch_<mode>`, one micro-step of the model; a transition with a wait is reported."""
     model = field.automaton
-    for mode in model.all_modes:
-        for transition in mode.transitions:
-            if transition.wait:
-                label = "a run inside a tick follows transitions without a wait only"
-                problems.error("run", transition.wait.span, label)
-    keys = [transition.key for mode in model.all_modes for transition in mode.transitions]
+    for transition in model.all_transitions:
+        if transition.wait:
+            label = "a run inside a tick follows transitions without a wait only"
+            problems.error("run", transition.wait.span, label)
+    keys = [transition.key for transition in model.all_transitions]
 
     def enabled(mode: Mode) -> dict[int, Expr]:
         """Return the guards of a mode.

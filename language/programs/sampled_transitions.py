@@ -28,7 +28,6 @@ from language.lowering.tick_history import Rollback
 from language.lowering.transition_choice import choose_by_priority, lower_sampled_choice
 from language.lowering.transition_metadata import infos_of_mode, start_run
 from language.model.automaton import Automaton, Mode, Transition
-from language.model.region_queries import transitions_of_regions
 from language.programs.rewind import (
     advance_from_crossing,
     rollback_bindings,
@@ -102,7 +101,7 @@ def lower_sampled_commit(
     numbers = {info.key: info.number for info in infos}
     selected = [
         (each, (fired_variable(each.region), numbers[f"{automaton.name} {each.key}"]))
-        for each in transitions_of_regions(automaton)
+        for each in automaton.all_transitions
     ]
     moved = select_blocks(
         (
@@ -145,9 +144,8 @@ def _keeps_timers(automaton: Automaton, mode: Mode) -> bool:
 @cache_on_owner
 def _timer_keeping_targets(automaton: Automaton) -> frozenset[tuple[str, str]]:
     """Return the (region, mode) pairs that transitions with `memory: continue` enter."""
-    transitions = [transition for mode in automaton.all_modes for transition in mode.transitions]
     return frozenset(
         (transition.region, transition.target)
-        for transition in transitions
+        for transition in automaton.all_transitions
         if transition.memory == "continue"
     )
