@@ -107,19 +107,23 @@ def selection_variables(context: ChartContext) -> list[Variable]:
 
 def _timers_and_choice(context: ChartContext, node: ChartNode, mode: Mode) -> tuple[Block, Block]:
     """Return the counters and edges of a mode's transitions, and the choice of a request."""
-    infos = [context.info_of(transition) for transition in mode.transitions]
-    choice = lower_sampled_choice(
-        context.automaton,
-        mode,
-        context.bindings,
-        infos,
-        lambda transition, guard: _enabled_condition(context, node, transition, guard),
-    )
+    choice = choice_of_node(context, node, mode)
     take: dict[int, Block] = {}
-    for k, info in enumerate(infos):
+    for k, info in enumerate(map(context.info_of, mode.transitions)):
         take[k] = (Assign(request_variable(node.region), integer(info.number), info.key),)
     chosen = choose_by_priority(mode, choice.enabled, take)
     return _count_waits(context, mode, choice), chosen
+
+
+def choice_of_node(context: ChartContext, node: ChartNode, mode: Mode) -> SampledChoice:
+    """Return the guards and waits of the transitions that leave a node, `mode` being its mode."""
+    return lower_sampled_choice(
+        context.automaton,
+        mode,
+        context.bindings,
+        [context.info_of(transition) for transition in mode.transitions],
+        lambda transition, guard: _enabled_condition(context, node, transition, guard),
+    )
 
 
 def _count_waits(context: ChartContext, mode: Mode, choice: SampledChoice) -> Block:

@@ -45,13 +45,14 @@ class SampledChoice:
     """The choice of a transition of a mode of a sampled automaton.
 
     `edges` detect edges and `counts` count the waits in a tick. `restarts` replace `counts` in a
-    later micro-step of the tick: a wait that begins there has the count 0. `enabled` are the
-    conditions of the transitions by their index in the mode.
+    later micro-step of the tick: a wait that begins there has the count 0. `conditions` are those
+    of the transitions by their index in the mode, and `enabled` those with the waits.
     """
 
     edges: Block
     counts: Block
     restarts: Block
+    conditions: Mapping[int, Expr]
     enabled: Mapping[int, Expr]
 
 
@@ -71,15 +72,16 @@ def lower_sampled_choice(
     guard_names = ChainMap(guard_memory_bindings(automaton, mode), dict(known))
     counts: list[Op] = []
     restarts: list[Op] = []
+    conditions: dict[int, Expr] = {}
     enabled: dict[int, Expr] = {}
     for k, transition in transitions_by_priority(mode):
-        info = infos[k]
-        enabled[k] = condition_of(transition, lower_expression(transition.when.tree, guard_names))
+        info, guard = infos[k], lower_expression(transition.when.tree, guard_names)
+        conditions[k] = enabled[k] = condition = condition_of(transition, guard)
         if info.timer:
             timer = Ref(info.timer)
-            counts.append(Count(info.timer, enabled[k], info.timer_limit, info.guard_key))
+            counts.append(Count(info.timer, condition, info.timer_limit, info.guard_key))
             begin = Branch(Compare("==", timer, integer(0)), (Assign(info.timer, integer(1)),))
-            restarts.append(Branch(enabled[k], (begin,), (Assign(info.timer, integer(0)),)))
+            restarts.append(Branch(condition, (begin,), (Assign(info.timer, integer(0)),)))
             enabled[k] = Compare(">", timer, wait_ticks(info))
     edges = tuple(detect_edges(automaton, mode, known))
-    return SampledChoice(edges, tuple(counts), tuple(restarts), enabled)
+    return SampledChoice(edges, tuple(counts), tuple(restarts), conditions, enabled)
