@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from codegen.emit.c_expression import CNameMap, emit_expression
+from codegen.emit.c_expression import CNameMap, LocalNames, PlainNames, emit_expression
 from codegen.emit.c_names import CNames
 from language.ir.number_type import NumberType
 from language.ir.ops import Assign
@@ -18,7 +18,7 @@ INSTANCE_NAME = "i_{}"
 
 
 @dataclass(frozen=True)
-class SignalNameMap:
+class SignalNameMap(PlainNames):
     """The C text of signals in the driver of a simulation.
 
     With `is_row` signals are read from the current row. With `is_timed` inputs that vary are
@@ -37,18 +37,6 @@ class SignalNameMap:
         if self.is_row:
             return f"out[{self.assembly.row_signals.index(signal)}]"
         return self.emit_signal(signal)
-
-    def integer_constant(self, name: str, number: int) -> str:
-        """Return a whole number that stands beside a signal, as a decimal; `name` is ignored."""
-        return repr(number)
-
-    def is_unsigned(self, name: str) -> bool:
-        """Return False: signals are reals."""
-        return False
-
-    def is_volatile(self, name: str) -> bool:
-        """Return False: nobody changes signals during a step."""
-        return False
 
     def emit_signal(self, name: str) -> str:
         """Return the C text of an input, a sensor value or an output `instance.signal`.
@@ -83,37 +71,13 @@ def emit_wire_formula(assembly: SimulationAssembly, block: str, c_names: CNameMa
     return f"(double)({emit_expression(op.value, c_names)})"
 
 
-@dataclass(frozen=True)
-class LocalNameMap:
-    """The C text of names that are local variables and members of a function of the driver."""
-
-    place_of: Callable[[str], str]
-    number: NumberType = "float64"
-
-    def __call__(self, name: str) -> str:
-        """Return the C text of a name."""
-        return self.place_of(name)
-
-    def integer_constant(self, name: str, number: int) -> str:
-        """Return a whole number that stands beside a name, as a decimal; `name` is ignored."""
-        return repr(number)
-
-    def is_unsigned(self, name: str) -> bool:
-        """Return False: all are reals."""
-        return False
-
-    def is_volatile(self, name: str) -> bool:
-        """Return False: nobody changes them during a step."""
-        return False
-
-
 def sensor_formulas() -> dict[str, str]:
     """Return the C text of the blocks of the Program of sensors.
 
     The filter `lag` is a pointer to its state; all other names are local variables.
     """
     places = {LAST_INPUT: "lag->input", LAST_OUTPUT: "lag->value"}
-    names = LocalNameMap(lambda name: places.get(name, unqualified_name(name)))
+    names = LocalNames(lambda name: places.get(name, unqualified_name(name)))
     blocks = sensor_program().blocks.items()
     assigned = [(block, op) for block, (op,) in blocks if isinstance(op, Assign)]
     return {block: emit_expression(op.value, names) for block, op in assigned}

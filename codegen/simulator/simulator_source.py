@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
-from codegen.emit.c_expression import format_literal
+from codegen.emit.c_expression import LocalNames, format_literal
 from codegen.emit.c_math import emit_math_files
 from codegen.emit.c_names import C_REAL_TYPE, c_member, c_type
 from codegen.emit.c_struct import calibration_members
@@ -24,7 +24,6 @@ from codegen.simulator.instance_module import (
 )
 from codegen.simulator.signal_names import (
     INSTANCE_NAME,
-    LocalNameMap,
     SignalNameMap,
     emit_wire_formula,
     row_width,
@@ -185,7 +184,7 @@ def _course_context(assembly: SimulationAssembly, course: InputTrajectory) -> di
         "low": repr(float(course.delay - Fraction(high))),
         "column": assembly.inputs.index(course.name),
         "formulas": [
-            (number, emit_wire_formula(assembly, block, LocalNameMap(lambda _: "now")))
+            (number, emit_wire_formula(assembly, block, LocalNames(lambda _: "now")))
             for number, block in course.formulas
         ],
     }
