@@ -178,8 +178,7 @@ def instrument_programs(
     """
     decisions, programs, arrays = {}, {}, {}
     for name, (automaton, varying) in automata.items():
-        transitions = [way for mode in automaton.all_modes for way in mode.transitions]
-        decisions[name] = tuple(decision_of(way) for way in transitions)
+        decisions[name] = tuple(map(decision_of, automaton.all_transitions))
         instrumented = instrument(lower_automaton(automaton, varying), decisions[name])
         programs[name], arrays[name] = run_passes(instrumented.program), instrumented.arrays
     return decisions, programs, arrays

@@ -9,13 +9,12 @@ A chart also records the active modes after each micro-step.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from expectation.mcdc import MAX_CONDITIONS, Decision, match_conditions
 from language.ir.ops import (
     Assign,
     Binary,
-    Block,
     Branch,
     Count,
     Expr,
@@ -29,6 +28,7 @@ from language.ir.ops import (
     integer,
 )
 from language.ir.program import Program, Variable, mode_variable
+from language.ir.rewrite_ops import map_operations
 
 GUARD_READ_BLOCK = "read_guards"
 """The block that evaluates and records the guards of the active modes, without other effects."""
@@ -38,10 +38,6 @@ GUARDS_PREFIX = "guards_"
 """Prefix of the blocks of a continuous Program that evaluate guards."""
 PROBED_PREFIX = "probed_"
 """Prefix of the instrumented copies of these blocks."""
-SELECTION_PREFIXES = ("jump", "count_", "choose_")
-"""Prefixes of the blocks of a sampled Program that evaluate guards."""
-FIRED_PREFIXES = ("memory.fired", "work.request_")
-"""Prefixes of the variables with the number of the selected or requested transition."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,17 +65,15 @@ def instrument(program: Program, decisions: Iterable[Decision]) -> InstrumentedP
     if program.period is None:
         guards = {n: b for n, b in blocks.items() if n.startswith(GUARDS_PREFIX)}
         blocks |= {
-            PROBED_PREFIX + n: _map_operations(b, inserter.insert_after_assignment)
+            PROBED_PREFIX + n: map_operations(b, inserter.insert_after_assignment)
             for n, b in guards.items()
         }
         for name, block in program.blocks.items():
             if name.startswith("jump"):
-                blocks[name] = _map_operations(block, _redirect_to_probed)
+                blocks[name] = map_operations(block, _redirect_to_probed)
         blocks[GUARD_READ_BLOCK] = tuple(_guard_reads(program.blocks["evaluate_guards"]))
     else:
-        for name, block in program.blocks.items():
-            if name.startswith(SELECTION_PREFIXES):
-                blocks[name] = _map_operations(block, inserter.insert_before_firing)
+        blocks = {n: map_operations(b, inserter.insert_before_firing) for n, b in blocks.items()}
     arrays = {key: inserter.arrays[key] for key in inserter.stored}
     sizes = {arrays[d.key]: 1 << len(d.conditions) for d in inserter.decisions if d.key in arrays}
     for region, mode in program.mode_variables().items() if COMMIT_BLOCK in blocks else ():
@@ -111,14 +105,16 @@ class _ProbeInserter:
         self.decisions = tuple(d for d in decisions if len(d.conditions) <= MAX_CONDITIONS)
         self.arrays = {d.key: f"probe.{k}" for k, d in enumerate(self.decisions)}
         self.stored: dict[str, None] = {}
-        self._by_key = {f"{program.name} {d.key}": d for d in self.decisions}
-        self._timers = {info.key: info.timer for info in program.transitions}
+        by_key = {f"{program.name} {d.key}": d for d in self.decisions}
+        decided = [(info, by_key[info.key]) for info in program.transitions if info.key in by_key]
+        self._by_guard = {info.guard_key: decision for info, decision in decided}
+        self._by_branch = {info.key: decision for info, decision in decided if not info.timer}
 
     def insert_after_assignment(self, op: Op) -> Iterator[Op]:
         """Yield an operation, and a store after it if it assigns a guard."""
         yield op
-        if isinstance(op, Assign) and op.key.endswith(".when"):
-            yield from self._store_combination(op.key.removesuffix(".when"), op.value)
+        if isinstance(op, Assign):
+            yield from self._store_combination(self._by_guard.get(op.key), op.value)
 
     def insert_before_firing(self, op: Op) -> Iterator[Op]:
         """Yield an operation, preceded by a store if it evaluates a guard.
@@ -127,20 +123,20 @@ class _ProbeInserter:
         """
         match op:
             case Count(_, condition, _, key):
-                yield from self._store_combination(key.removesuffix(".when"), condition)
+                yield from self._store_combination(self._by_guard.get(key), condition)
             case Branch(condition, then, _):
-                assignments = (inner for inner in then if isinstance(inner, Assign))
-                for inner in assignments:  # the guard of a wait is recorded at its counter
-                    if inner.target.startswith(FIRED_PREFIXES) and not self._timers.get(inner.key):
-                        yield from self._store_combination(inner.key, condition)
+                for inner in then:
+                    if isinstance(inner, Assign):
+                        yield from self._store_combination(
+                            self._by_branch.get(inner.key), condition
+                        )
         yield op
 
-    def _store_combination(self, key: str, guard: Expr) -> Iterator[Op]:
+    def _store_combination(self, decision: Decision | None, guard: Expr) -> Iterator[Op]:
         """Yield a store of the combination of a guard's conditions.
 
-        Yield nothing if the decision is not recorded or its structure does not match.
+        Yield nothing without a decision, or if its structure does not match.
         """
-        decision = self._by_key.get(key)
         parts = match_conditions(decision.structure, guard) if decision else None
         if decision is None or parts is None:
             return
@@ -149,21 +145,6 @@ class _ProbeInserter:
             index = Binary("+", index, Select(part, integer(1 << k), integer(0)))
         self.stored[decision.key] = None
         yield Store(self.arrays[decision.key], index, Value(True))
-
-
-def _map_operations(block: Block, change: Callable[[Op], Iterator[Op]]) -> Block:
-    """Return a block whose operations, innermost first, are each replaced by a sequence."""
-    found: list[Op] = []
-    for op in block:
-        match op:
-            case Branch(condition, then, other):
-                op = Branch(
-                    condition, _map_operations(then, change), _map_operations(other, change)
-                )
-            case Switch(selector, cases):
-                op = Switch(selector, tuple((k, _map_operations(b, change)) for k, b in cases))
-        found += change(op)
-    return tuple(found)
 
 
 def _redirect_to_probed(op: Op) -> Iterator[Op]:

@@ -15,9 +15,18 @@ import typer
 from hypothesis import settings
 
 from language.loading import load
+from language.lowering import connection_program, sensor_program
 from modewright.runtime.gc_threshold import raise_gc_threshold
 from tests.support.memoised_specs import memoise_lowering, memoise_shipped
+from tests.support.valid_lowering import require_valid_result
 
+for module, function in (
+    (load, "lower_sampled_automaton"),
+    (load, "lower_continuous_automaton"),
+    (connection_program, "formula_program"),
+    (sensor_program, "formula_program"),
+):
+    setattr(module, function, require_valid_result(getattr(module, function)))
 load.program_of = memoise_lowering(load.program_of)  # before it is imported by name
 from modewright.api import simulation as api  # noqa: E402
 

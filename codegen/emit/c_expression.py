@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Protocol
 
 from codegen.emit.c_names import C_REAL_TYPE
@@ -28,6 +29,34 @@ class CNameMap(Protocol):
 
     def is_volatile(self, name: str) -> bool:
         """Tell whether a constant is on a page that another program may change at any time."""
+
+
+class PlainNames:
+    """The part of a CNameMap for names that are reals, and that nobody else changes."""
+
+    def integer_constant(self, name: str, number: int) -> str:
+        """Return a whole number as a decimal; `name` is ignored."""
+        return str(number)
+
+    def is_unsigned(self, name: str) -> bool:
+        """Return False: all names are reals."""
+        return False
+
+    def is_volatile(self, name: str) -> bool:
+        """Return False: nobody changes them during a step."""
+        return False
+
+
+@dataclass(frozen=True)
+class LocalNames(PlainNames):
+    """The names inside a function, of which `text_of` gives the C text."""
+
+    text_of: Callable[[str], str]
+    number: NumberType = "float64"
+
+    def __call__(self, name: str) -> str:
+        """Return the C text of a name."""
+        return self.text_of(name)
 
 
 LIBM_FUNCTIONS: Mapping[str, str] = {"abs": "fabs", "sqrt": "sqrt", "floor": "floor"}

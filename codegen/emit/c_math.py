@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from codegen.emit.c_expression import MATH_SUFFIX, emit_expression, format_literal
+from codegen.emit.c_expression import MATH_SUFFIX, LocalNames, emit_expression, format_literal
 from codegen.emit.c_names import C_REAL_TYPE
 from codegen.emit.c_statement import (
     INDENT,
@@ -111,28 +111,9 @@ def _number_context(number: NumberType) -> dict[str, Any]:
     }
 
 
-@dataclass(frozen=True)
-class _LocalNameMap:
-    """The names inside a function of ha_math, where every variable is a local."""
-
-    number: NumberType
-
-    def __call__(self, name: str) -> str:
-        return unqualified_name(name)
-
-    def integer_constant(self, name: str, number: int) -> str:
-        return str(number)
-
-    def is_unsigned(self, name: str) -> bool:
-        return False
-
-    def is_volatile(self, name: str) -> bool:
-        return False
-
-
 def _function_context(function: Function, number: NumberType) -> dict[str, Any]:
     """Return the template context of one function: its name, parameters, comment and lines."""
-    c_names = _LocalNameMap(number)
+    c_names = LocalNames(unqualified_name, number)
     lines: list[str] = []
     for op in function.body:
         assert isinstance(op, Assign)

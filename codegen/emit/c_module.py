@@ -35,7 +35,7 @@ from language.ir.ops import FaultBit
 from language.ir.printer import digest
 from language.ir.program import ENTRY_BLOCKS, InlineMark, Program, Variable
 from language.ir.rewrite_ops import direct_expressions, walk_post_order
-from language.ir.traversal import called_blocks, names_used, walk_ops
+from language.ir.traversal import called_blocks, called_functions, walk_ops
 from language.lowering.calibration_stamp import STALE_CALIBRATION
 from language.model.declaration import MICRO_STEP_LIMIT_FAULT
 from language.model.graph_algorithms import post_order
@@ -133,9 +133,7 @@ def module_context(program: Program, page_layout: PageLayout = HOST_PAGE) -> dic
     local = locals_of(program, loop_variables)
     usage_by_block = block_usages(program, local, page_layout.groups)
     kinds = {variable.name: c_type(variable, program.number_type) for variable in program.variables}
-    called_functions = {
-        name.removeprefix("call ") for name in names_used(program.blocks.values()) if " " in name
-    }
+    called = called_functions(program.blocks.values())
     shared = _shared_work_variables(program, local)
     scratch = scratch_of(program, shared, usage_by_block, page_layout.holds_solved)
     if scratch and scratch.block != STEP:
@@ -161,9 +159,9 @@ def module_context(program: Program, page_layout: PageLayout = HOST_PAGE) -> dic
             if any(block["keyword"] == word for block in blocks)
         ],
         "has_stamps": "compare_stamps" in program.blocks,
-        "uses_math": bool(called_functions & {*FUNCTIONS_BY_TYPE[number], *INLINE_FUNCTIONS}),
+        "uses_math": bool(called & {*FUNCTIONS_BY_TYPE[number], *INLINE_FUNCTIONS}),
         "uses_page_tables": _uses_volatile_tables(program, page_layout),
-        "uses_libm": bool(called_functions & {"abs", "sqrt", "floor"}),
+        "uses_libm": bool(called & {"abs", "sqrt", "floor"}),
     }
 
 

@@ -85,10 +85,8 @@ class ExecutionPath:
         for op in equations:
             if isinstance(op, Assign):
                 value = self._fold_constants(op.value)
-                if all(
-                    n in reused or n.startswith((*constant_groups, "call "))
-                    for n in expr_names(value)
-                ):
+                names = expr_names(value)
+                if all(n in reused or n.startswith(constant_groups) for n in names):
                     reused.add(op.target)
                     self._values.number_by_name[op.target] = number = self._values.number_of(value)
                     if not op.target.startswith(WORK):

@@ -8,10 +8,11 @@ fault range_a of a          fault range_a of a
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
-from language.ir.ops import Assign, Block, Branch, FaultBit, Loop, Op, Switch, Value
+from language.ir.ops import Assign, FaultBit, Op, Value
 from language.ir.program import Program, Variable
+from language.ir.rewrite_ops import map_operations
 from language.ir.traversal import walk_ops
 
 RANGE_VIOLATION_FLAG = "memory.left_{}"
@@ -39,23 +40,12 @@ def add_range_violation_flags(program: Program) -> Program:
         return program
     marks = {signal: RANGE_VIOLATION_FLAG.format(k) for k, signal in enumerate(signals)}
     variables = (*program.variables, *(Variable(name, "truth") for name in marks.values()))
-    blocks = {name: tuple(_insert_marks(b, marks)) for name, b in program.blocks.items()}
+
+    def insert_mark(op: Op) -> Iterator[Op]:
+        """Yield an operation, and the assignment of its flag if it sets the bit of a signal."""
+        yield op
+        if isinstance(op, FaultBit) and op.signal and op.value:
+            yield Assign(marks[op.signal], Value(True))
+
+    blocks = {name: map_operations(block, insert_mark) for name, block in program.blocks.items()}
     return dataclasses.replace(program, variables=variables, blocks=blocks)
-
-
-def _insert_marks(block: Block, marks: Mapping[str, str]) -> Iterator[Op]:
-    """Yield the operations of a block with the flags set, also inside nested blocks."""
-    for op in block:
-        match op:
-            case Branch(condition, then, other):
-                inner = (tuple(_insert_marks(b, marks)) for b in (then, other))
-                yield Branch(condition, *inner)
-            case Switch(selector, cases):
-                yield Switch(selector, tuple((k, tuple(_insert_marks(b, marks))) for k, b in cases))
-            case Loop(count, index, body):
-                yield Loop(count, index, tuple(_insert_marks(body, marks)))
-            case FaultBit(_, signal, True) if signal:
-                yield op
-                yield Assign(marks[signal], Value(True))
-            case _:
-                yield op

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from codegen.emit.c_expression import CNameMap, emit_expression
+from codegen.emit.c_expression import CNameMap, LocalNames, PlainNames, emit_expression
 from codegen.emit.c_names import CNames
 from language.ir.number_type import NumberType
 from language.ir.ops import Assign
 from language.ir.program import Program, unqualified_name
+from language.lowering.sensor_program import LAST_INPUT, LAST_OUTPUT, sensor_program
 from language.programs.system_program import SimulationAssembly, output_variables
 
 INSTANCE_NAME = "i_{}"
@@ -17,7 +18,7 @@ INSTANCE_NAME = "i_{}"
 
 
 @dataclass(frozen=True)
-class SignalNameMap:
+class SignalNameMap(PlainNames):
     """The C text of signals in the driver of a simulation.
 
     With `is_row` signals are read from the current row. With `is_timed` inputs that vary are
@@ -36,18 +37,6 @@ class SignalNameMap:
         if self.is_row:
             return f"out[{self.assembly.row_signals.index(signal)}]"
         return self.emit_signal(signal)
-
-    def integer_constant(self, name: str, number: int) -> str:
-        """Return a whole number that stands beside a signal, as a decimal; `name` is ignored."""
-        return repr(number)
-
-    def is_unsigned(self, name: str) -> bool:
-        """Return False: signals are reals."""
-        return False
-
-    def is_volatile(self, name: str) -> bool:
-        """Return False: nobody changes signals during a step."""
-        return False
 
     def emit_signal(self, name: str) -> str:
         """Return the C text of an input, a sensor value or an output `instance.signal`.
@@ -82,27 +71,16 @@ def emit_wire_formula(assembly: SimulationAssembly, block: str, c_names: CNameMa
     return f"(double)({emit_expression(op.value, c_names)})"
 
 
-@dataclass(frozen=True)
-class TimeNameMap:
-    """The C text of names in a formula of time: every name is the variable `now`."""
+def sensor_formulas() -> dict[str, str]:
+    """Return the C text of the blocks of the Program of sensors.
 
-    number: NumberType = "float64"
-
-    def __call__(self, name: str) -> str:
-        """Return the C text of the time."""
-        return "now"
-
-    def integer_constant(self, name: str, number: int) -> str:
-        """Return a whole number that stands beside the time, as a decimal; `name` is ignored."""
-        return repr(number)
-
-    def is_unsigned(self, name: str) -> bool:
-        """Return False: the time is a real."""
-        return False
-
-    def is_volatile(self, name: str) -> bool:
-        """Return False: nobody changes the time during a step."""
-        return False
+    The filter `lag` is a pointer to its state; all other names are local variables.
+    """
+    places = {LAST_INPUT: "lag->input", LAST_OUTPUT: "lag->value"}
+    names = LocalNames(lambda name: places.get(name, unqualified_name(name)))
+    blocks = sensor_program().blocks.items()
+    assigned = [(block, op) for block, (op,) in blocks if isinstance(op, Assign)]
+    return {block: emit_expression(op.value, names) for block, op in assigned}
 
 
 def column_positions(assembly: SimulationAssembly) -> list[int]:

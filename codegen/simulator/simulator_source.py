@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
-from codegen.emit.c_expression import format_literal
+from codegen.emit.c_expression import LocalNames, format_literal
 from codegen.emit.c_math import emit_math_files
 from codegen.emit.c_names import C_REAL_TYPE, c_member, c_type
 from codegen.emit.c_struct import calibration_members
@@ -25,15 +25,15 @@ from codegen.simulator.instance_module import (
 from codegen.simulator.signal_names import (
     INSTANCE_NAME,
     SignalNameMap,
-    TimeNameMap,
     emit_wire_formula,
     row_width,
+    sensor_formulas,
 )
 from codegen.simulator.simd_batch import LANES
 from codegen.toolchain.templates import product_version, render
 from language.ir.number_type import NumberType
 from language.ir.program import ENGINE_BLOCKS, STEP_INTERFACE, Program, unqualified_name
-from language.ir.traversal import names_used
+from language.ir.traversal import called_functions
 from language.lowering.program_builder import finalise_program
 from language.model.system import Sensor
 from language.programs.system_program import (
@@ -108,14 +108,14 @@ def _driver_context(
     ]
     row_names = dataclasses.replace(signal_names, is_row=True)
     sensors = [_sensor_context(sensor, signal_names) for sensor in assembly.sensors.values()]
-    wired = names_used(assembly.wires.blocks.values())
-    called = {name for name in wired if name.startswith("call ")}
+    called = called_functions(assembly.wires.blocks.values())
     has_lag = any(sensor.lag for sensor in assembly.sensors.values())
     return {
         "version": product_version(),
         "title": "A run",
         "instances": instances,
         "sensors": sensors,
+        "sensor_formulas": sensor_formulas(),
         "seen": [seen for part in instances for flag in part["flags"] for seen, _ in flag["seen"]],
         "width": row_width(assembly),
         "lanes": LANES if any(one["has_simd"] for one in instances) else 0,
@@ -184,7 +184,7 @@ def _course_context(assembly: SimulationAssembly, course: InputTrajectory) -> di
         "low": repr(float(course.delay - Fraction(high))),
         "column": assembly.inputs.index(course.name),
         "formulas": [
-            (number, emit_wire_formula(assembly, block, TimeNameMap()))
+            (number, emit_wire_formula(assembly, block, LocalNames(lambda _: "now")))
             for number, block in course.formulas
         ],
     }

@@ -35,11 +35,11 @@ from language.ir.ops import (
     Value,
 )
 from language.ir.program import Function, Program
+from language.ir.rewrite_ops import substitute_variable
 from language.ir.traversal import (
-    block_names,
+    called_functions,
     expr_names,
     subexpressions,
-    substitute_variable,
 )
 from language.numerics.evaluate import BINARY_OPERATIONS
 
@@ -345,6 +345,6 @@ def _call_depth(function: Function, functions: tuple[Function, ...]) -> int:
 
     Callees have smaller numbers.
     """
-    names = block_names(function.body)
-    called = [f for f in functions if f is not function and f"call {f.name}" in names]
+    names = called_functions([function.body])
+    called = [f for f in functions if f is not function and f.name in names]
     return sum(1 + _call_depth(f, functions) for f in called)

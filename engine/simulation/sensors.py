@@ -3,42 +3,41 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from collections import deque
 from collections.abc import Iterator
 from fractions import Fraction
-from functools import lru_cache
 
 import numpy as np
 
+from engine.interpreter.interpreter import Interpreter
+from language.lowering.program_builder import FORMULA_RESULT
+from language.lowering.sensor_program import (
+    ELAPSED,
+    INPUT,
+    LAST_INPUT,
+    LAST_OUTPUT,
+    RESOLUTION,
+    TIME_CONSTANT,
+    sensor_program,
+)
 from language.model.system import Sensor
-from language.numerics.evaluate import apply_function
 
 NOISE_CHUNK = 1024
 """Number of noise values drawn at once; the stream does not depend on it."""
 
 
-@lru_cache(maxsize=1024)
-def _decay(exponent: float) -> float:
-    """Return e^-exponent by the exponential function of the language.
-
-    It has the same bits on every machine.
-    """
-    return float(apply_function("exp", [-exponent]))
-
-
 class FirstOrderLag:
-    """First-order lag L y' = u - y, exact for an input that is linear between the given points.
-
-    With u = u0 + r s: y(h) = u(h) - r L + (y0 - u0 + r L) e^(-h / L).
-    """
+    """State of the filter of a sensor, a first-order lag (language/lowering/sensor_program.py)."""
 
     def __init__(self, lag: Fraction) -> None:
-        """Take the time constant L [s]; 0 means no lag."""
+        """Take the time constant [s]; 0 means no lag."""
         self._lag = float(lag)
         self._time: Fraction | None = None
         self._input = 0.0
         self._value = 0.0
+        self._elapsed: float | None = None
+        self._numerics = Interpreter(sensor_program())
+        self._numerics.set(TIME_CONSTANT, self._lag)
 
     def advance(self, time: Fraction, value: float) -> None:
         """Advance the lag to a time [s] at which the input is `value`.
@@ -61,13 +60,18 @@ class FirstOrderLag:
         """
         if self._lag == 0.0:
             return value
-        if self._time is None or time <= self._time:
+        if self._time is None:
             return self._value
-        h = float(time - self._time)
-        if h == 0.0 or math.isinf(self._lag / h):
-            return self._value
-        slope = (value - self._input) * (self._lag / h)
-        return value - slope + (self._value - self._input + slope) * _decay(h / self._lag)
+        numerics, elapsed = self._numerics, float(time - self._time)
+        numerics.set(INPUT, value)
+        numerics.set(LAST_INPUT, self._input)
+        numerics.set(LAST_OUTPUT, self._value)
+        if elapsed != self._elapsed:
+            numerics.set(ELAPSED, elapsed)
+            numerics.run("decay")
+            self._elapsed = elapsed
+        numerics.run("lag")
+        return float(numerics.get(FORMULA_RESULT))
 
 
 def philox_of(seed: int, name: str) -> np.random.Philox:
@@ -100,7 +104,8 @@ class SensorRun:
         self._in_transit: deque[float] = deque()
         self._first = 0.0
         self._sd = float(sensor.noise)
-        self._quantum = float(sensor.quantum)
+        self._numerics = Interpreter(sensor_program())
+        self._numerics.set(RESOLUTION, float(sensor.quantum))
         self._noise = noise_stream(seed, sensor.name)
 
     def start(self, measured: float) -> None:
@@ -143,7 +148,9 @@ class SensorRun:
         return self._quantise(self.lag.evaluate(time, measured))
 
     def _quantise(self, value: float) -> float:
-        """Return floor(x / q + 1/2) * q (rule 19); values that are not finite remain unchanged."""
-        if not self._quantum or not math.isfinite(value):
+        """Return the multiple of the resolution next to a value (rule 19c)."""
+        if not self.sensor.quantum:
             return value
-        return math.floor(value / self._quantum + 0.5) * self._quantum
+        self._numerics.set(INPUT, value)
+        self._numerics.run("quantise")
+        return float(self._numerics.get(FORMULA_RESULT))

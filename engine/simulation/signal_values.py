@@ -13,11 +13,11 @@ from engine.simulation.stimuli import InputSignal
 from language.expressions.syntax_tree import names
 from language.ir.program import Program
 from language.lowering.connection_program import (
-    WIRE_RESULT,
     connection_block,
     wire_formulas,
     wires_program,
 )
+from language.lowering.program_builder import FORMULA_RESULT
 from language.model.declaration import Formula
 from language.model.system import Connection, DelayedSignal, Scenario, System
 
@@ -169,7 +169,7 @@ class Signals:
         for name in self._reads[block]:
             self._wires.set(f"signal.{name}", read(name))
         self._wires.run(block)
-        return self._wires.get(WIRE_RESULT)
+        return self._wires.get(FORMULA_RESULT)
 
     def _evaluate_piece(self, block: str, time: float) -> float:
         """Return the value of a formula piece of a stimulus at a time [s]."""

@@ -54,6 +54,18 @@ class ChartContext:
         """
         return self.automaton.modes_by_key.get(node.mode_key)
 
+    @cached_property
+    def exit_flags(self) -> Mapping[int, str]:
+        """The variable of `exit_flag` by the index of each node that has an exit action."""
+        nodes = ((node, self.mode_of(node)) for node in self.chart.nodes)
+        return {node.index: exit_flag(node).name for node, mode in nodes if mode and mode.exit}
+
+    @cached_property
+    def entry_flags(self) -> Mapping[int, str]:
+        """The variable of `entry_flag` by the index of each node that has an entry action."""
+        nodes = ((node, self.mode_of(node)) for node in self.chart.nodes)
+        return {node.index: entry_flag(node).name for node, mode in nodes if mode and mode.entry}
+
     def info_of(self, transition: Transition) -> TransitionInfo:
         """Return the number, timer and other data of a transition, by its key path."""
         return self.transition_infos[transition.key]

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from language.charts.chart_context import NEVER_LEFT, ChartContext, entry_flag, history_ref
+from language.charts.chart_context import NEVER_LEFT, ChartContext, history_ref
 from language.ir.ops import Assign, Block, Branch, Compare, Op, Switch, Value, integer
 from language.ir.program import mode_variable
 from language.lowering.edge_detection import start_timers
@@ -154,8 +154,8 @@ class _EntrySet:
             ops.append(Assign(variable, integer(node.number)))
         if mode is None:
             return ops
-        if mode.entry:
-            ops.append(Assign(entry_flag(node).name, Value(True)))
+        if node.index in context.entry_flags:
+            ops.append(Assign(context.entry_flags[node.index], Value(True)))
         if self.transition.memory == "reset" and node.index in context.timer_keeping_nodes:
             timers = [context.info_of(transition).timer for transition in mode.transitions]
             ops += [Assign(timer, integer(0)) for timer in timers if timer]

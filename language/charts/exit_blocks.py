@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from language.charts.chart_context import ChartContext, exit_flag, history_ref, to_identifier
+from language.charts.chart_context import ChartContext, history_ref, to_identifier
 from language.ir.ops import Assign, Block, Op, Ref, RunBlock, Switch, Value, integer
 from language.ir.program import mode_variable
 from language.lowering.edge_detection import edge_detectors_by_mode
@@ -68,8 +68,8 @@ def _exit_node(context: ChartContext, node: ChartNode) -> list[Op]:
         ops.append(Assign(history_ref(node).name, now if node.kind == "compound" else integer(1)))
     if mode is None:
         return ops
-    if mode.exit:
-        ops.append(Assign(exit_flag(node).name, Value(True)))
+    if node.index in context.exit_flags:
+        ops.append(Assign(context.exit_flags[node.index], Value(True)))
     if node.index not in context.timer_keeping_nodes:
         timers = [context.info_of(transition).timer for transition in mode.transitions]
         ops += [Assign(timer, integer(0)) for timer in timers if timer]

@@ -42,7 +42,15 @@ from language.ir.ops import (
     integer,
 )
 from language.ir.program import LOG_COUNT_VARIABLE, LOG_VARIABLE, Variable, fired_variable
-from language.lowering.action_stages import commit_stage, lower_entry, read_stage
+from language.lowering.action_stages import (
+    Selection,
+    TransitionStages,
+    bindings_of_targets,
+    initial_stages,
+    lower_transition,
+    order_stages,
+    select_blocks,
+)
 from language.lowering.event_queue import (
     CURRENT_EVENT,
     HAS_WAITING_EVENT,
@@ -51,10 +59,9 @@ from language.lowering.event_queue import (
     enqueue_input_events,
     event_queue_variables,
 )
-from language.lowering.expressions import names_read
-from language.model.automaton import Automaton
-from language.model.declaration import MICRO_STEP_LIMIT_FAULT, Formula
-from language.model.statechart import ROOT, Chart, ChartNode
+from language.model.automaton import Mode, Transition
+from language.model.declaration import MICRO_STEP_LIMIT_FAULT
+from language.model.statechart import ROOT
 
 HAS_NEXT_STEP = Ref("work.is_busy")
 """The variable that another micro-step follows in this tick."""
@@ -110,27 +117,10 @@ def clear_histories(context: ChartContext) -> Block:
     return tuple(Assign(history_ref(node).name, integer(NEVER_LEFT)) for node in nodes)
 
 
-def lower_initial_entries(automaton: Automaton, chart: Chart, now: Mapping[str, Expr]) -> Block:
-    """Return the entry actions of the initial configuration, one stage for each depth.
-
-    Outer nodes come first. Each stage evaluates the equations of the initial mode that it reads.
-    `now` are the bindings without equations.
-    """
-    active = [
-        (chart.depth(node), automaton.modes_by_key.get(node.mode_key))
-        for node in chart.initial_configuration()
-    ]
-    initial = automaton.modes[automaton.initial]
-    ops: list[Op] = []
-    for depth in sorted({depth for depth, _ in active}):
-        written = {
-            name: formula
-            for own, mode in active
-            if own == depth and mode
-            for name, formula in mode.entry.items()
-        }
-        ops += lower_entry(automaton, initial, written, now)
-    return tuple(ops)
+def initial_chart_stages(context: ChartContext) -> TransitionStages:
+    """Return the entries of the initial configuration of a chart as stages."""
+    nodes = [(node, context.mode_of(node)) for node in context.chart.initial_configuration()]
+    return initial_stages((context.chart.depth(node), mode) for node, mode in nodes if mode)
 
 
 def _lower_single_micro_step(context: ChartContext) -> Block:
@@ -223,23 +213,47 @@ def _any_selected_condition(context: ChartContext, variable_of: Callable[[str], 
 
 
 def _commit_block(context: ChartContext, evaluate_equations: Op) -> Block:
-    """Return the operations of the selected transitions: exits, resets, entries, equations."""
+    """Return the operations of the selected transitions: exits, resets, entries, equations.
+
+    The flags of the nodes that are left and entered select their actions.
+    """
+    nodes = context.chart.nodes
+
+    def flagged(flags: Mapping[int, str]) -> list[tuple[Mode, int, Selection]]:
+        """Return the modes of nodes with a flag, each with its depth and its flag."""
+        modes = ((context.mode_of(nodes[index]), index, flag) for index, flag in flags.items())
+        return [(m, context.chart.depth(nodes[k]), (flag, True)) for m, k, flag in modes if m]
+
+    stages = order_stages(
+        flagged(context.exit_flags),
+        (
+            (transition, _selection(context, transition), _raise_events(context, transition))
+            for transition, _ in context.all_transitions
+        ),
+        flagged(context.entry_flags),
+    )
+    read = bindings_of_targets(context.automaton, context.base_bindings, evaluate_equations)
+    flags = (*context.exit_flags.values(), *context.entry_flags.values())
+    return (
+        *(Assign(flag, Value(False)) for flag in flags),
+        *_log_and_exit(context),
+        *lower_transition(context.automaton, stages, read, _enter_targets(context)),
+        evaluate_equations,
+    )
+
+
+def _raise_events(context: ChartContext, transition: Transition) -> Block:
+    """Return the operations that enqueue the events which a transition raises."""
     ops: list[Op] = []
-    leaving = [n for n in context.chart.nodes if (m := context.mode_of(n)) and m.exit]
-    coming = [n for n in context.chart.nodes if (m := context.mode_of(n)) and m.entry]
-    ops += [Assign(exit_flag(node).name, Value(False)) for node in leaving]
-    ops += [Assign(entry_flag(node).name, Value(False)) for node in coming]
-    ops += _log_and_exit(context)
-    for depth in sorted({context.chart.depth(node) for node in leaving}, reverse=True):
-        nodes = [node for node in leaving if context.chart.depth(node) == depth]
-        ops += _lower_flagged_stage(
-            context,
-            [(exit_flag(n), context.automaton.modes_by_key[n.mode_key].exit) for n in nodes],
-        )
-    ops += _lower_resets(context)
-    ops += _enter_targets(context)
-    ops += _lower_entries(context, coming, evaluate_equations)
-    return (*ops, evaluate_equations)
+    for name in transition.raises:
+        ops += enqueue_event(context.chart, name, context.queue_capacity)
+    return tuple(ops)
+
+
+def _selection(context: ChartContext, transition: Transition) -> Selection:
+    """Return the variable and the number that select a transition."""
+    variable = _selected_variable_name(context)(transition.region)
+    return variable, context.info_of(transition).number
 
 
 def _log_and_exit(context: ChartContext) -> Block:
@@ -283,72 +297,9 @@ def _append_log_entry(context: ChartContext, entry: Expr) -> Op:
     return Branch(Compare("<", Ref(LOG_COUNT_VARIABLE), integer(_log_size(context))), written)
 
 
-def _lower_flagged_stage(
-    context: ChartContext, flagged: list[tuple[Ref, Mapping[str, Formula]]]
-) -> Block:
-    """Return one stage of the nodes whose flag is set: all read, then all commit."""
-    automaton = context.automaton
-    reads = [
-        Branch(flag, tuple(read_stage(automaton, written, context.bindings)))
-        for flag, written in flagged
-    ]
-    commits = [Branch(flag, tuple(commit_stage(automaton, written))) for flag, written in flagged]
-    return (*reads, *commits)
-
-
-def _lower_resets(context: ChartContext) -> Block:
-    """Return the resets of all selected transitions as one stage, and the events they raise."""
-    automaton = context.automaton
-    reads: list[Op] = []
-    commits: list[Op] = []
-    for region in context.chart.regions:
-        read, commit = [], []
-        for transition, _ in context.transitions_in(region.region):
-            number = context.info_of(transition).number
-            written = transition.reset
-            if written:
-                read.append((number, tuple(read_stage(automaton, written, context.bindings))))
-            ops = tuple(commit_stage(automaton, written))
-            for name in transition.raises:
-                ops = (*ops, *enqueue_event(context.chart, name, context.queue_capacity))
-            if ops:
-                commit.append((number, ops))
-        chosen = _selected_variable_name(context)(region.region)
-        reads += [Switch(chosen, tuple(read))] if read else []
-        commits += [Switch(chosen, tuple(commit))] if commit else []
-    return (*reads, *commits)
-
-
 def _enter_targets(context: ChartContext) -> Block:
     """Return the operations that activate the entry sets of the selected transitions."""
-    ops: list[Op] = []
-    for region in context.chart.regions:
-        cases = []
-        for transition, chart_transition in context.transitions_in(region.region):
-            block = lower_entry_set(context, transition, chart_transition)
-            if block:
-                cases.append((context.info_of(transition).number, block))
-        if cases:
-            ops.append(Switch(_selected_variable_name(context)(region.region), tuple(cases)))
-    return tuple(ops)
-
-
-def _lower_entries(
-    context: ChartContext, entered_nodes: list[ChartNode], evaluate_equations: Op
-) -> Block:
-    """Return the entry actions from the outside in, one stage for each depth.
-
-    The equations are evaluated before a stage that reads one.
-    """
-    ops: list[Op] = []
-    automaton = context.automaton
-    for depth in sorted({context.chart.depth(node) for node in entered_nodes}):
-        nodes = [node for node in entered_nodes if context.chart.depth(node) == depth]
-        written = [automaton.modes_by_key[node.mode_key].entry for node in nodes]
-        reads = names_read(formula.tree for each in written for formula in each.values())
-        if any(name in context.bindings and name not in context.base_bindings for name in reads):
-            ops.append(evaluate_equations)
-        ops += _lower_flagged_stage(
-            context, list(zip(map(entry_flag, nodes), written, strict=True))
-        )
-    return tuple(ops)
+    return select_blocks(
+        (_selection(context, transition), lower_entry_set(context, transition, chart_transition))
+        for transition, chart_transition in context.all_transitions
+    )

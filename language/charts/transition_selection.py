@@ -9,7 +9,6 @@ of their `priority`.
 
 from __future__ import annotations
 
-from collections import ChainMap
 from collections.abc import Sequence
 
 from language.charts.chart_context import (
@@ -26,7 +25,6 @@ from language.ir.ops import (
     Block,
     Branch,
     Compare,
-    Count,
     Expr,
     Op,
     Ref,
@@ -38,18 +36,16 @@ from language.ir.ops import (
 from language.ir.program import Variable, mode_variable
 from language.ir.root_region import CHART
 from language.lowering.chart_activity import is_complete
-from language.lowering.edge_detection import (
-    detect_edges,
-    edge_detectors_by_mode,
-    guard_memory_bindings,
-)
+from language.lowering.edge_detection import edge_detectors_by_mode
 from language.lowering.event_queue import event_condition
-from language.lowering.expressions import lower_expression
 from language.lowering.fault_mode import FAULT_PRIORITY
 from language.lowering.range_saturation import FAULT_HAPPENED
-from language.lowering.transition_metadata import wait_ticks
+from language.lowering.transition_choice import (
+    SampledChoice,
+    choose_by_priority,
+    lower_sampled_choice,
+)
 from language.model.automaton import Mode, Transition
-from language.model.region_queries import transitions_by_priority
 from language.model.statechart import ChartNode
 
 EMPTY_SPAN = (1, 0)
@@ -110,43 +106,32 @@ def selection_variables(context: ChartContext) -> list[Variable]:
 
 
 def _timers_and_choice(context: ChartContext, node: ChartNode, mode: Mode) -> tuple[Block, Block]:
-    """Return the counters and edges of a mode's transitions, and the choice of a request.
-
-        choice    if guard_1: request = 1 else if guard_2: ...    (in the order of priority)
-
-    A transition with a wait is enabled when its counter is above the wait (rule 4b).
-    """
-    automaton = context.automaton
-    edges = tuple(detect_edges(automaton, mode, context.bindings))
-    known = ChainMap(guard_memory_bindings(automaton, mode), dict(context.bindings))
-    counts: list[Op] = []
-    later: list[Op] = []
-    chain: Block = ()
-    for _, transition in reversed(transitions_by_priority(mode)):
-        info = context.info_of(transition)
-        enabled = _enabled_condition(
-            context, node, transition, lower_expression(transition.when.tree, known)
-        )
-        if info.timer:
-            timer = Ref(info.timer)
-            key = f"{automaton.name} {transition.when.key}"
-            counts.insert(0, Count(info.timer, enabled, info.timer_limit, key))
-            begin = (Assign(info.timer, integer(1)),)
-            begun = (Branch(Compare("==", timer, integer(0)), begin),)
-            later.insert(0, Branch(enabled, begun, (Assign(info.timer, integer(0)),)))
-            enabled = Compare(">", timer, wait_ticks(info))
-        take = Assign(request_variable(node.region), integer(info.number), info.key)
-        chain = (Branch(enabled, (take,), chain),)
-    return _count_waits(context, mode, edges, tuple(counts), tuple(later)), chain
+    """Return the counters and edges of a mode's transitions, and the choice of a request."""
+    choice = choice_of_node(context, node, mode)
+    take: dict[int, Block] = {}
+    for k, info in enumerate(map(context.info_of, mode.transitions)):
+        take[k] = (Assign(request_variable(node.region), integer(info.number), info.key),)
+    chosen = choose_by_priority(mode, choice.enabled, take)
+    return _count_waits(context, mode, choice), chosen
 
 
-def _count_waits(
-    context: ChartContext, mode: Mode, edges: Block, counts: Block, restarts: Block
-) -> Block:
+def choice_of_node(context: ChartContext, node: ChartNode, mode: Mode) -> SampledChoice:
+    """Return the guards and waits of the transitions that leave a node, `mode` being its mode."""
+    return lower_sampled_choice(
+        context.automaton,
+        mode,
+        context.bindings,
+        [context.info_of(transition) for transition in mode.transitions],
+        lambda transition, guard: _enabled_condition(context, node, transition, guard),
+    )
+
+
+def _count_waits(context: ChartContext, mode: Mode, choice: SampledChoice) -> Block:
     """Return the operations that count waits once a tick (rule 4c).
 
     A wait that begins in a later micro-step starts at 1 there, and a false guard clears it.
     """
+    edges, counts = choice.edges, choice.counts
     if not context.has_several_micro_steps or not (edges or counts):
         return (*edges, *counts)
     found = edge_detectors_by_mode(context.automaton).get(mode.key, ())
@@ -155,7 +140,7 @@ def _count_waits(
         Branch(
             IS_FIRST_STEP,
             (*edges, *counts),
-            (Branch(IS_STEP_LIMIT_REACHED, over, (*edges, *restarts)),),
+            (Branch(IS_STEP_LIMIT_REACHED, over, (*edges, *choice.restarts)),),
         ),
     )
 
@@ -164,7 +149,7 @@ def _enabled_condition(
     context: ChartContext, node: ChartNode, transition: Transition, guard: Expr
 ) -> Expr:
     """Return the condition of a transition: completion, guard, or event and guard."""
-    event = event_condition(context.chart, transition)
+    event = event_condition(context.chart, transition, context.queue_capacity)
     if transition.is_completion:
         return is_complete(context.chart, node, "memory.mode")
     if event is None:

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import islice
 
-from language.checks.check_instant_cycles import MAX_CYCLES, Cycle, simple_cycles
+from language.checks.check_instant_cycles import MAX_CYCLES, Cycle, format_cycle, simple_cycles
 from language.expressions.syntax_tree import TIME_FUNCTIONS, FunctionCall, walk
 from language.ir.ops import Expr, Ref, Unary
-from language.lowering.constants import evaluate_exactly
+from language.lowering.constants import wait_seconds
 from language.model.automaton import Automaton, Transition
 from language.model.statechart import ROOT, Chart, ChartNode
 from language.model.transition_precedence import node_of
@@ -46,7 +46,7 @@ def check_chart_cycles(automaton: Automaton, query_engine: QueryEngine, problems
     chart = automaton.statechart
     if chart is None or chart.micro_steps < 2:
         return
-    transitions = {each.key: each for mode in automaton.all_modes for each in mode.transitions}
+    transitions = {each.key: each for each in automaton.all_transitions}
     after = {
         key: list(_possible_successors(automaton, chart, each)) for key, each in transitions.items()
     }
@@ -54,9 +54,8 @@ def check_chart_cycles(automaton: Automaton, query_engine: QueryEngine, problems
         cycle = tuple(transitions[key] for key in members)
         witness = _find_endless_witness(automaton, chart, cycle, query_engine)
         if witness:
-            path = " -> ".join(f"`{each.source}`" for each in (*cycle, cycle[0]))
             label = "this fires in every micro-step of a tick"
-            label += f": {path}" if cycle[0].targets else ""
+            label += f": {format_cycle(cycle)}" if cycle[0].targets else ""
             hint = EVENT_HINT if cycle[0].events else CYCLE_HINT
             hint = hint if cycle[0].targets else _self_loop_hint(automaton, cycle[0])
             problems.warning("cycle", cycle[-1].span, label, witness.hint_prefix + hint)
@@ -98,7 +97,7 @@ def _possible_successors(
     if not transition.targets:
         yield transition.key  # an elapsed wait remains elapsed
         return
-    if transition.wait and evaluate_exactly(transition.wait, automaton):
+    if wait_seconds(transition, automaton):
         return
     targets = [chart.nodes[index] for index in chart.transitions[transition.key].targets]
     if any(target.kind == "history" for target in targets):
@@ -108,7 +107,7 @@ def _possible_successors(
     for index in sorted(entered | ancestors):
         mode = automaton.modes_by_key.get(chart.nodes[index].mode_key)
         for other in mode.transitions if mode else ():
-            if other.targets and not (other.wait and evaluate_exactly(other.wait, automaton)):
+            if other.targets and not wait_seconds(other, automaton):
                 yield other.key
 
 
@@ -153,9 +152,7 @@ def _has_required_events(automaton: Automaton, chart: Chart, cycle: Cycle) -> bo
     pairs = zip(before, cycle, strict=True)
     if not all({*last.raises} & {*each.events} for last, each in pairs if each.events):
         return False
-    others = (
-        each for mode in automaton.all_modes for each in mode.transitions if each not in cycle
-    )
+    others = (each for each in automaton.all_transitions if each not in cycle)
     come = {name for each in others for name in each.raises}
     come |= {name for name, signal in chart.events.items() if signal.is_input}
     return any(not each.events or come & {*each.events} for each in cycle)
@@ -178,7 +175,7 @@ def _competing_transitions(
         other = node_of(automaton, mode)
         assert other is not None
         for rival in mode.transitions if _are_nested(chart, node, other) else ():
-            if rival in cycle or (rival.wait and evaluate_exactly(rival.wait, automaton)):
+            if rival in cycle or wait_seconds(rival, automaton):
                 continue
             if rival.is_completion and mode != source:
                 continue  # a mode with transitions is not final, so no other mode completes
@@ -202,14 +199,7 @@ def _is_constant_in_tick(
     A variable can change if it is a mode variable, has one of the given prefixes, or an entry, exit
     or reset assigns to it.
     """
-    written: set[str] = set()
-    for mode in automaton.all_modes:
-        for formulas in (
-            mode.entry,
-            mode.exit,
-            *(transition.reset for transition in mode.transitions),
-        ):
-            written.update(formulas)
+    written = {n for mode in automaton.all_modes for part in mode.jump_assignments for n in part}
     return not any(
         name.startswith(("mode.", *changing_prefixes)) or name.partition(".")[2] in written
         for name in variables

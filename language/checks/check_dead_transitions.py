@@ -10,7 +10,7 @@ from contextlib import suppress
 from fractions import Fraction
 
 from language.ir.ops import Compare, Expr, Ref, Unary, Value, integer, real
-from language.lowering.constants import evaluate_exactly
+from language.lowering.constants import wait_seconds
 from language.lowering.wait_ticks import seconds_to_ticks, tunable_wait, wait_range_in_ticks
 from language.model.automaton import Automaton, Mode, Transition
 from language.model.declaration import Formula, Range
@@ -91,9 +91,7 @@ def check_close_waits(automaton: Automaton, query_engine: QueryEngine, problems:
         for earlier, later in _waiting_pairs(mode):
             if any(tunable_wait(automaton, transition.wait) for transition in (earlier, later)):
                 continue
-            first, second = (
-                _wait_seconds(automaton, transition) for transition in (earlier, later)
-            )
+            first, second = (wait_seconds(transition, automaton) for transition in (earlier, later))
             difference = abs(first - second)
             if first and second and 0 < difference < automaton.period:
                 if guards.are_exclusive(earlier, later):
@@ -330,17 +328,12 @@ def _describe_guard(transition: Transition) -> str:
     return f"the guard of `{transition.name}`" if transition.is_table_cell else "this"
 
 
-def _wait_seconds(automaton: Automaton, transition: Transition) -> Fraction:
-    """Return the wait of a transition [s], exactly; 0 without `wait`."""
-    return evaluate_exactly(transition.wait, automaton) if transition.wait else Fraction(0)
-
-
 def _wait_range(automaton: Automaton, transition: Transition) -> Range:
     """Return the shortest and longest wait: ticks if the automaton is sampled, else [s]."""
     tunable = tunable_wait(automaton, transition.wait)
     if tunable:
         return wait_range_in_ticks(automaton, automaton.parameters[tunable])
-    wait = _wait_seconds(automaton, transition)
+    wait = wait_seconds(transition, automaton)
     exact = Fraction(seconds_to_ticks(automaton, wait)) if automaton.period else wait
     return exact, exact
 

@@ -14,12 +14,12 @@ from language.expressions.balance_form import coefficient_of
 from language.expressions.syntax_tree import SyntaxTree
 from language.ir.ops import Compare, Unary, real
 from language.ir.root_region import CHART
-from language.lowering.delay_buffers import action_formulas
 from language.lowering.program_parameters import parameter_order
 from language.model.automaton import Automaton, Mode
 from language.model.evaluation_order import equation_order
 from language.model.region_queries import equation_formulas
 from language.model.truth_table import truth_table_formulas
+from language.model.used_names import action_formulas
 from language.smt.query_engine import QueryEngine
 from language.smt.symbolic_environment import GuardSnapshot
 from language.text.diagnostic import Problems, SpecError

@@ -14,10 +14,11 @@ from itertools import islice
 from language.expressions.syntax_tree import Name, Relation, SyntaxTree, walk
 from language.ir.analysis_cache import cache_on_owner
 from language.ir.ops import Expr, Unary
-from language.lowering.constants import evaluate_exactly
+from language.lowering.constants import wait_seconds
 from language.lowering.event_tolerance import is_instantaneous
-from language.model.automaton import Automaton, Mode, Transition
+from language.model.automaton import Automaton, Transition
 from language.model.graph_algorithms import strongly_connected_components
+from language.model.region_queries import earlier_by_priority
 from language.smt.bound_propagation import is_disproved_by_bounds
 from language.smt.query_engine import QueryEngine, Witness
 from language.smt.symbolic_environment import GuardSnapshot, SymbolicPath
@@ -39,7 +40,7 @@ def check_short_cycles(automaton: Automaton, problems: Problems) -> None:
     compares a state by `<=` or `>=`, else at that of the last one.
     """
     for cycle, witness in _endless_cycles(automaton, range(1, 3)):
-        label = f"this fires again at the same instant, for ever: {_format_cycle(cycle)}"
+        label = f"this fires again at the same instant, for ever: {format_cycle(cycle)}"
         hint = f"{witness.hint_prefix}write the direction of motion too, like "
         hint += "`x >= limit and v > 0 m/s`" + _range_hint(automaton)
         problems.error("refire", _boundary_transition(automaton, cycle).when.span, label, hint)
@@ -52,7 +53,7 @@ def check_long_cycles(automaton: Automaton, problems: Problems) -> None:
     that of `check_short_cycles`.
     """
     for cycle, witness in _endless_cycles(automaton, range(3, MAX_CYCLE_LENGTH + 1)):
-        label = f"from here the modes change for ever at one instant: {_format_cycle(cycle)}"
+        label = f"from here the modes change for ever at one instant: {format_cycle(cycle)}"
         hint = f"{witness.hint_prefix}let one of them wait, or its guard exclude the one before"
         hint += _range_hint(automaton)
         problems.warning("cycle", _boundary_transition(automaton, cycle).when.span, label, hint)
@@ -115,12 +116,10 @@ def instant_transitions(automaton: Automaton) -> list[Transition]:
 
     A wait within the tolerance of rule 10 is 0.
     """
-    transitions = [transition for mode in automaton.all_modes for transition in mode.transitions]
     return [
         transition
-        for transition in transitions
-        if not transition.wait
-        or is_instantaneous(automaton, evaluate_exactly(transition.wait, automaton))
+        for transition in automaton.all_transitions
+        if is_instantaneous(automaton, wait_seconds(transition, automaton))
     ]
 
 
@@ -218,8 +217,8 @@ def path_constraints(automaton: Automaton, cycle: Cycle) -> tuple[SymbolicPath, 
     snapshot = GuardSnapshot(automaton, automaton.source_mode(cycle[0]), path)
     needed: list[Expr] = []
     for position, transition in enumerate(cycle):
-        for other in snapshot.mode.transitions:
-            if (other.priority or 0) < (transition.priority or 0) and not other.wait:
+        for other in earlier_by_priority(snapshot.mode, transition):
+            if not other.wait:
                 needed.append(Unary("not", snapshot.lower_expression(other.when.tree)))
         needed.append(snapshot.lower_expression(transition.when.tree))
         if position + 1 < len(cycle):
@@ -255,17 +254,11 @@ def _may_be_disturbed(automaton: Automaton, cycle: Cycle, witness: Witness) -> b
     if any(name.startswith("mode.") for name in witness.valuation):
         return True
     others = (m for m in automaton.all_modes if m.region != cycle[0].region)
-    written = {name for mode in others for name in _assigned_names(mode)}
+    written = {name for mode in others for part in mode.jump_assignments for name in part}
     return any(name.partition(".")[2] in written for name in witness.valuation)
 
 
-def _assigned_names(mode: Mode) -> Iterator[str]:
-    """Yield the names that entry, exit and resets of a mode assign."""
-    for formulas in (mode.entry, mode.exit, *(transition.reset for transition in mode.transitions)):
-        yield from formulas
-
-
-def _format_cycle(cycle: Cycle) -> str:
+def format_cycle(cycle: Cycle) -> str:
     """Return the sources of a cycle as text: `a` -> `b` -> `a`."""
     return " -> ".join(f"`{transition.source}`" for transition in (*cycle, cycle[0]))
 

@@ -102,9 +102,7 @@ def _completed_mode(chart: Chart, node: ChartNode) -> ChartNode | None:
 def _queried_nodes(automaton: Automaton, chart: Chart) -> set[int]:
     """Return the indices of the nodes that a guard or an equation reads by `in(...)`."""
     paths = mode_paths(chart)
-    trees = [
-        transition.when.tree for mode in automaton.all_modes for transition in mode.transitions
-    ]
+    trees = [transition.when.tree for transition in automaton.all_transitions]
     trees += [each.tree for mode in automaton.all_modes for each in mode.equations.values()]
     indices: set[int] = set()
     for part in (part for tree in trees for part in walk(tree)):

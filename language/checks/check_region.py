@@ -82,6 +82,5 @@ def _written_names(region: Region, what: str) -> Iterator[tuple[str, Span]]:
         elif what == "balance":
             yield from ((name, balance.left.span) for name, balance in mode.flow.items())
         else:
-            resets = [transition.reset for transition in mode.transitions]
-            for formulas in (mode.entry, mode.exit, mode.update, *resets):
+            for formulas in (mode.update, *mode.jump_assignments):
                 yield from ((name, formula.span) for name, formula in formulas.items())

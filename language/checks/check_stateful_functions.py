@@ -14,7 +14,7 @@ from language.expressions.syntax_tree import (
     walk,
 )
 from language.ir.program import MAX_TIMER_TICKS
-from language.lowering.constants import evaluate_exactly
+from language.lowering.constants import evaluate_exactly, wait_seconds
 from language.lowering.continuous_delay import tunable_delay_of
 from language.lowering.delay_buffers import (
     MAX_DELAY,
@@ -149,6 +149,6 @@ def _check_edge_has_no_wait(
         for part in walk(transition.when.tree)
         if isinstance(part, FunctionCall) and part.function in (*EDGE_FUNCTIONS, "every")
     ]
-    if edges and transition.wait and evaluate_exactly(transition.wait, automaton) > 0:
+    if edges and wait_seconds(transition, automaton) > 0:
         label = f"`{edges[0].function}` is true for one instant: it cannot hold for a wait"
         problems.error("wait", edges[0].span, label)

@@ -55,10 +55,9 @@ def _check_events(automaton: Automaton, problems: Problems) -> None:
     event that nothing raises is left to the check of dead transitions if a transition reacts to
     such events only.
     """
-    transitions = [each for mode in automaton.all_modes for each in mode.transitions]
     possible = possible_events(automaton)
-    heard = {name for transition in transitions for name in transition.events}
-    dead = [each for each in transitions if not possible & {*each.events}]
+    heard = {name for transition in automaton.all_transitions for name in transition.events}
+    dead = [each for each in automaton.all_transitions if not possible & {*each.events}]
     reported = {name for transition in dead for name in transition.events}
     for event in automaton.statechart.events.values() if automaton.statechart else ():
         name = event.name
@@ -99,10 +98,8 @@ def _check_unwritten(automaton: Automaton, problems: Problems) -> None:
 
 def _written_names(automaton: Automaton, mode: Mode) -> Iterator[str]:
     """Yield the names that a mode or its transitions write, observers and runs included."""
-    for group in (mode.update, mode.entry, mode.exit, mode.flow):
+    for group in (mode.update, mode.flow, *mode.jump_assignments):
         yield from group
-    for transition in mode.transitions:
-        yield from transition.reset
     if mode.observer:
         yield from mode.observer.states
     if mode.run and automaton.model:

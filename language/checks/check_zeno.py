@@ -10,10 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 
-from language.checks.check_instant_cycles import Cycle, instant_transitions
+from language.checks.check_instant_cycles import Cycle, format_cycle, instant_transitions
 from language.expressions.syntax_tree import NEGATED_RELATION, FunctionCall, names, walk
 from language.ir.ops import Binary, Call, Compare, Expr, Ref, Unary, Value, multiply, real, subtract
 from language.model.automaton import Automaton, Transition
+from language.model.region_queries import earlier_by_priority
 from language.smt.lie_derivative import LieDerivative, UnknownRateError
 from language.smt.query import SolverQuery
 from language.smt.query_engine import QueryEngine, Witness
@@ -42,8 +43,8 @@ def check_zeno(automaton: Automaton, query_engine: QueryEngine, problems: Proble
         except (KeyError, SpecError, UnknownRateError):
             continue
         if witness:
-            path = " -> ".join(f"`{each.source}`" for each in (*cycle, cycle[0]))
-            label = f"here the modes can change infinitely often in a finite time: {path}"
+            label = "here the modes can change infinitely often in a finite time: "
+            label += format_cycle(cycle)
             hint = f"at {witness.text} each flow leads back at once; "
             hint += "leave a distance between the limits (a hysteresis), or let one of them wait"
             problems.warning("zeno", cycle[0].when.span, label, hint)
@@ -125,9 +126,7 @@ def _exclude_urgent_transitions(becoming: _EnablingCondition, transition: Transi
     """
     found: list[Expr] = []
     snapshot = becoming.snapshot
-    for other in snapshot.mode.transitions:
-        if (other.priority or 0) >= (transition.priority or 0):
-            continue
+    for other in earlier_by_priority(snapshot.mode, transition):
         if other not in instant_transitions(snapshot.automaton):
             continue
         with suppress(KeyError, SpecError, UnknownRateError):

@@ -30,7 +30,7 @@ from language.ir.ops import (
     real,
     subtract,
 )
-from language.ir.traversal import expr_names, names_used, reachable_blocks
+from language.ir.traversal import expr_functions, expr_names, names_used, reachable_blocks
 from language.model.automaton import Mode
 
 MAX_UNROLLED_TERMS = 8
@@ -158,8 +158,11 @@ def _conjuncts(guard: Expr) -> list[Expr]:
 
 
 def _reads_only(part: Expr, states: set[str]) -> bool:
-    """Return whether an expression reads at least one of the states, and else constants only."""
+    """Return whether an expression without calls reads states, and else constants only."""
     names = set(expr_names(part))
-    return bool(names & states) and all(
-        n in states or n.startswith(CONSTANT_PREFIXES) for n in names
+    is_arithmetic = not expr_functions(part)
+    return (
+        is_arithmetic
+        and bool(names & states)
+        and all(n in states or n.startswith(CONSTANT_PREFIXES) for n in names)
     )

@@ -291,17 +291,20 @@ def _taylor_series(
     a, remainder = context.state_matrix(field, mode), _remainder_refs(field, mode, context)
     state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in field.states}
     order, index = Ref("work.order"), Ref("work.term")
-    ops: list[Op] = [Assign("work.order", real(1.0))]
+    ops: list[Op] = []
     for i, name in enumerate(field.states):
         with_remainder = [remainder[name]] if name in remainder else []
         value = sum_of([*_row_products(field, mode, "A", a, i, state), *with_remainder])
         ops.append(Store(f"work.series_{name}", integer(0), value))
+    if term_count < 2:
+        return tuple(ops)
     before: dict[str, Expr] = {name: Item(f"work.series_{name}", index) for name in field.states}
     body: list[Op] = [Assign("work.order", add(order, real(1.0)))]
     for i, name in enumerate(field.states):
         value = divide(sum_of(_row_products(field, mode, "A", a, i, before)), order)
         body.append(Store(f"work.series_{name}", add(index, integer(1)), value))
-    return (*ops, Loop(max(0, term_count - 1), "work.term", tuple(body)))
+    loop = Loop(term_count - 1, "work.term", tuple(body))
+    return (Assign("work.order", real(1.0)), *ops, loop)
 
 
 def exact_method(

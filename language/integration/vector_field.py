@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import ChainMap
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from language.expressions.units import rate_dimension
@@ -17,7 +17,6 @@ from language.ir.ops import (
     Assign,
     Binary,
     Block,
-    Branch,
     Compare,
     Expr,
     Op,
@@ -29,11 +28,10 @@ from language.ir.ops import (
 )
 from language.ir.program import Variable, mode_variable
 from language.lowering.action_stages import (
+    StageBindings,
     action_variables,
-    commit_stage,
-    lower_stage,
-    read_stage,
-    storage_of,
+    stage_reads,
+    transition_stages,
 )
 from language.lowering.continuous_edge_detection import level_change_conditions, set_levels
 from language.lowering.expressions import (
@@ -53,16 +51,11 @@ from language.lowering.guard_variable_names import (
 )
 from language.lowering.program_builder import equation_variables
 from language.model.automaton import Automaton, Balance, Mode, Transition
-from language.model.declaration import Formula
 from language.model.region_queries import (
     possible_balances,
     region_of_balance,
-    transitions_by_priority,
     watched_transitions,
 )
-
-ALWAYS = Value(True)
-"""The condition of a transition that is taken if no other one is enabled."""
 
 
 @dataclass(frozen=True)
@@ -214,89 +207,26 @@ def any_guard_condition(
     return result
 
 
-def select_by_priority(
-    mode: Mode, enabled: Mapping[int, Expr], effects: Mapping[int, Block]
-) -> Block:
-    """Return the operations of the enabled transition with the smallest priority (rule 3a).
+def stage_bindings(field: VectorField, targets: Iterable[Mode]) -> StageBindings:
+    """Return what the stages of a transition read at the point (rule 6).
 
-    `enabled` and `effects` map the index of a transition in the mode to its condition and its
-    operations. A transition with the condition `ALWAYS` is taken without a test, and those after it
-    are left out. If none is enabled, nothing happens.
+    `targets` are the modes of the chart that may be active after it. Their equations are evaluated
+    by the active mode.
     """
-    ops: Block = ()
-    for k, _ in reversed(transitions_by_priority(mode)):
-        ops = effects[k] if enabled[k] == ALWAYS else (Branch(enabled[k], effects[k], ops),)
-    return ops
 
+    def equations_of(names: list[str]) -> Iterable[Op]:
+        """Return the operations that evaluate the equations of the active mode among some names."""
+        cases = []
+        for mode in targets:
+            known = bindings_at_point(field)
+            ops = lower_equations(mode, known, "work.at_", field.key_prefix, names)
+            cases.append((mode.number, tuple(ops)))
+        if len(cases) == 1:
+            return cases[0][1]
+        return [Switch(field.mode_variable_name, tuple(cases))] * any(ops for _, ops in cases)
 
-def lower_reset_stages(field: VectorField, transition: Transition) -> tuple[list[Op], list[Op]]:
-    """Return the two halves of a transition's reset: evaluation, then storage (rule 5).
-
-    The values are evaluated at the point, equations included. Both lists are empty without a reset.
-    """
-    automaton, known = field.automaton, all_bindings_at_point(field)
-    return read_stage(automaton, transition.reset, known), commit_stage(automaton, transition.reset)
-
-
-def lower_single_region_step(
-    field: VectorField, mode: Mode, enabled: Mapping[int, Expr], extra_effects: Mapping[int, Block]
-) -> Block:
-    """Return one micro-step of an automaton without parallel regions.
-
-    The enabled transition with the smallest priority runs its actions, sets the mode and then runs
-    its operations of `extra_effects`. `enabled` and `extra_effects` have the index of a transition
-    in the mode as key; transitions may be absent from `extra_effects`.
-    """
-    fire = {
-        k: (
-            *lower_transition_actions(field, transition),
-            set_target_mode(field, transition),
-            *extra_effects.get(k, ()),
-        )
-        for k, transition in enumerate(mode.transitions)
-    }
-    return select_by_priority(mode, enabled, fire)
-
-
-def lower_transition_actions(field: VectorField, transition: Transition) -> list[Op]:
-    """Return exit, reset and entry of a transition if no parallel region fires with it (rule 6).
-
-    The order is exit, reset, entry; each stage reads the values after the one before. The mode
-    variable is not set. A reset of one variable without exit and entry is stored without a `work`
-    variable.
-    """
-    source, target = (
-        field.automaton.source_mode(transition),
-        field.automaton.target_mode(transition),
-    )
-    if source.exit or target.entry:
-        ops = lower_stage(field.automaton, source.exit, all_bindings_at_point(field))
-        ops += [op for op in set_point_to_state(field) if transition.reset]
-        ops += lower_stage(field.automaton, transition.reset, all_bindings_at_point(field))
-        return [*ops, *lower_entry_at_point(field, target, target.entry)]
-    first, second = lower_reset_stages(field, transition)
-    if len(first) == 1:
-        (name,) = transition.reset
-        (only,) = first
-        assert isinstance(only, Assign)
-        return [Assign(storage_of(field.automaton, name), only.value, only.key)]
-    return first + second
-
-
-def lower_entry_at_point(
-    field: VectorField, target: Mode, assignments: Mapping[str, Formula]
-) -> list[Op]:
-    """Return the entry actions of `target` after the reset; none without assignments.
-
-    First the point is set to the states and the equations of `target` that the entry reads are
-    evaluated.
-    """
-    if not assignments:
-        return []
-    known = bindings_at_point(field)
-    required = names_read(formula.tree for formula in assignments.values())
-    ops = lower_equations(target, known, "work.at_", field.key_prefix, required)
-    return [*set_point_to_state(field), *ops, *lower_stage(field.automaton, assignments, known)]
+    known = all_bindings_at_point(field)
+    return StageBindings(known, known, equations_of, tuple(set_point_to_state(field)))
 
 
 def set_target_mode(field: VectorField, transition: Transition) -> Assign:
@@ -338,12 +268,11 @@ def _lower_guards(field: VectorField, mode: Mode) -> Block:
     The equations that guards, exits and resets read are evaluated first.
     """
     known = bindings_at_point(field)
-    trees = [transition.when.tree for transition in watched_transitions(mode)]
-    for active in (mode, *(m for region in mode.parallel_regions for m in region.modes.values())):
-        trees += [formula.tree for formula in active.exit.values()]
-    for transition in watched_transitions(mode):
-        trees += [formula.tree for formula in transition.reset.values()]
-    ops = lower_equations(mode, known, "work.at_", field.key_prefix, names_read(trees))
+    watched = list(watched_transitions(mode))
+    read = [name for transition in watched for name in transition.when.reads]
+    for transition in watched:
+        read += stage_reads(transition_stages(field.automaton, transition).before)
+    ops = lower_equations(mode, known, "work.at_", field.key_prefix, read)
     ops += _lower_own_guards(field, mode, len(mode.transitions))
     for region in mode.parallel_regions:
         modes = region.modes.values()

@@ -213,11 +213,10 @@ def _program_lines(program: Program) -> Iterator[Line]:
 def interface_reads(program: Program, name: str) -> list[str]:
     """Return the names that a block reads, directly or through the blocks that it runs.
 
-    Calls of functions are not among them. Blocks that do not exist are ignored.
+    Blocks that do not exist are ignored.
     """
     reached = _existing_blocks(program, name)
-    names = (read for inner in reached for read in block_reads(program.blocks[inner]))
-    return [read for read in names if not read.startswith("call ")]
+    return [read for inner in reached for read in block_reads(program.blocks[inner])]
 
 
 def interface_writes(program: Program, name: str) -> list[str]:

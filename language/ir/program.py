@@ -14,7 +14,7 @@ A variable is called `group.name`. The group gives its meaning and its storage:
     axis      points of an axis of a table
     innovation  measurement minus its prediction, of an observer
     is_new    whether a measurement is new in this tick
-    signal    value that a connection of a system reads
+    signal    value that a connection or a sensor of a system reads
     work      local variable of one call
 """
 
@@ -151,6 +151,15 @@ class TransitionInfo:
     chart_endpoints: tuple[str, str] | None = None
     tunable_wait: str | None = None
     max_ticks: int = 0
+
+    @property
+    def guard_key(self) -> str:
+        """The key path of the operation that evaluates the guard for a variable or a counter.
+
+        The guard of a sampled transition without a wait is instead the condition of the branch
+        that holds the operation with `key`.
+        """
+        return f"{self.key}.when"
 
     @property
     def timer_limit(self) -> int:

@@ -5,7 +5,7 @@ target := e  ->  target := transform(e)        (likewise in every kind of operat
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from language.ir.ops import (
     Assign,
@@ -19,10 +19,12 @@ from language.ir.ops import (
     Item,
     Loop,
     Op,
+    Ref,
     Select,
     Store,
     Switch,
     Unary,
+    Value,
 )
 
 ExprTransform = Callable[[Expr], Expr]
@@ -83,7 +85,52 @@ def map_expressions(block: Block, transform: ExprTransform) -> Block:
     branches and counters, inner blocks included, but not the selector of a switch. `transform` gets
     whole expressions, not their parts.
     """
-    return tuple(_map_op(op, transform) for op in block)
+    return map_operations(block, lambda op: (_map_direct_expressions(op, transform),))
+
+
+def map_operations(block: Block, change: Callable[[Op], Iterable[Op]]) -> Block:
+    """Return a block with each operation replaced by those that `change` gives for it.
+
+    Inner blocks come first: `change` gets an operation whose inner blocks are replaced already.
+    """
+
+    def changed(inner: Block) -> Block:
+        """Return an inner block with its operations replaced."""
+        return map_operations(inner, change)
+
+    found: list[Op] = []
+    for op in block:
+        found += change(map_inner_blocks(op, changed))
+    return tuple(found)
+
+
+def map_inner_blocks(op: Op, change: Callable[[Block], Block]) -> Op:
+    """Return an operation with `change` applied to each block inside it, in the order of the text.
+
+    An operation without inner blocks is returned as it is.
+    """
+    match op:
+        case Branch(condition, then, other):
+            return Branch(condition, change(then), change(other))
+        case Switch(selector, cases):
+            return Switch(selector, tuple((number, change(case)) for number, case in cases))
+        case Loop(count, index, body):
+            return Loop(count, index, change(body))
+    return op
+
+
+def substitute_variable(block: Block, name: str, constant: int) -> Block:
+    """Return a block with a literal in place of each read of a whole-number variable.
+
+    Targets, arrays and selectors keep their names.
+    """
+
+    def substituted(expr: Expr) -> Expr:
+        """Return an expression with the literal."""
+        is_read = isinstance(expr, Ref) and expr.name == name
+        return Value(constant) if is_read else map_operands(expr, substituted)
+
+    return map_expressions(block, substituted)
 
 
 def remove_empty_switches(block: Block) -> Block:
@@ -91,22 +138,12 @@ def remove_empty_switches(block: Block) -> Block:
 
     when x is <nothing>    ->    <no operation>
     """
-    ops: list[Op] = []
-    for op in block:
-        match op:
-            case Switch(_, ()):
-                pass
-            case Switch(selector, cases):
-                inner = tuple((number, remove_empty_switches(case)) for number, case in cases)
-                ops.append(Switch(selector, inner))
-            case Branch(condition, then, other):
-                arms = remove_empty_switches(then), remove_empty_switches(other)
-                ops.append(Branch(condition, *arms))
-            case Loop(count, index, body):
-                ops.append(Loop(count, index, remove_empty_switches(body)))
-            case _:
-                ops.append(op)
-    return tuple(ops)
+
+    def keep(op: Op) -> Block:
+        """Return an operation, nothing for a switch without cases."""
+        return () if isinstance(op, Switch) and not op.cases else (op,)
+
+    return map_operations(block, keep)
 
 
 def direct_expressions(op: Op) -> tuple[Expr, ...]:
@@ -136,21 +173,15 @@ def walk_post_order(expr: Expr) -> Iterator[Expr]:
     yield expr
 
 
-def _map_op(op: Op, transform: ExprTransform) -> Op:
-    """Return an operation with `transform` applied to its expressions, inner blocks included."""
+def _map_direct_expressions(op: Op, transform: ExprTransform) -> Op:
+    """Return an operation with `transform` applied to its `direct_expressions`."""
     match op:
         case Assign(target, value, key):
             return Assign(target, transform(value), key)
         case Store(array, index, value):
             return Store(array, transform(index), transform(value))
         case Branch(condition, then, other):
-            inner = (map_expressions(block, transform) for block in (then, other))
-            return Branch(transform(condition), *inner)
-        case Switch(selector, cases):
-            return Switch(selector, tuple((k, map_expressions(b, transform)) for k, b in cases))
-        case Loop(count, index, body):
-            return Loop(count, index, map_expressions(body, transform))
+            return Branch(transform(condition), then, other)
         case Count(timer, condition, limit, key):
             return Count(timer, transform(condition), limit, key)
-        case _:
-            return op
+    return op

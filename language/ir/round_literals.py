@@ -9,13 +9,11 @@ values and ignores the type.
 from __future__ import annotations
 
 import dataclasses
-from typing import TypeVar
 
 from language.ir.number_type import NumberType, round_to_type
-from language.ir.ops import Block, Value
+from language.ir.ops import Block, Expr, Value
 from language.ir.program import Constant, Program
-
-NodeT = TypeVar("NodeT")
+from language.ir.rewrite_ops import map_expressions, map_operands
 
 
 def round_program(program: Program) -> Program:
@@ -39,7 +37,18 @@ def round_block(block: Block, number_type: NumberType) -> Block:
 
     For float64 the same block is returned.
     """
-    return block if number_type == "float64" else _round_node(block, number_type)
+    if number_type == "float64":
+        return block
+
+    def rounded(expr: Expr) -> Expr:
+        """Return an expression with its literals rounded."""
+        return (
+            expr.round_to_type(number_type)
+            if isinstance(expr, Value)
+            else map_operands(expr, rounded)
+        )
+
+    return map_expressions(block, rounded)
 
 
 def _round_constant(constant: Constant, number_type: NumberType) -> Constant:
@@ -58,23 +67,3 @@ def _round_constant(constant: Constant, number_type: NumberType) -> Constant:
         if limits
         else None,
     )
-
-
-def _round_node(part: NodeT, number_type: NumberType) -> NodeT:
-    """Return an operation, an expression or a tuple of them with all literals rounded.
-
-    Parts without a change are returned as the same objects.
-    """
-    if isinstance(part, Value):
-        return part.round_to_type(number_type)  # type: ignore[return-value]
-    if isinstance(part, tuple):
-        return tuple([_round_node(item, number_type) for item in part])  # type: ignore[return-value]
-    if dataclasses.is_dataclass(part) and not isinstance(part, type):
-        changed = {}
-        for field in dataclasses.fields(part):
-            old = getattr(part, field.name)
-            new = _round_node(old, number_type)
-            if new is not old:
-                changed[field.name] = new
-        return dataclasses.replace(part, **changed) if changed else part
-    return part

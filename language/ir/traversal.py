@@ -26,8 +26,8 @@ from language.ir.ops import (
     Store,
     Switch,
     Unary,
-    Value,
 )
+from language.ir.rewrite_ops import direct_expressions
 
 
 def walk_ops(block: Block) -> Iterator[Op]:
@@ -50,32 +50,18 @@ def walk_ops(block: Block) -> Iterator[Op]:
             stack += op.body[::-1]
 
 
-def block_names(block: Block) -> list[str]:
-    """Return the names that a block reads, then those that it writes, with repetitions.
-
-    They are those of `block_reads` (a call counts as the name `call <function>`) and
-    `block_writes`.
-    """
-    return block_reads(block) + block_writes(block)
-
-
 def block_reads(block: Block) -> list[str]:
     """Return the variables and constants that a block reads, in the order of the text, repeated.
 
-    A call counts as the name `call <function>`. Inner blocks and selectors of switches are
-    included, blocks of RunBlock are not. A counter is not among the reads of its own operation.
+    Inner blocks and selectors of switches are included, blocks of RunBlock are not. A counter is
+    not among the reads of its own operation.
     """
     names: list[str] = []
     for op in walk_ops(block):
-        if isinstance(op, Assign):
-            names += expr_names(op.value)
-        elif isinstance(op, (Branch, Count)):
-            names += expr_names(op.condition)
-        elif isinstance(op, Store):
-            names += expr_names(op.index)
-            names += expr_names(op.value)
-        elif isinstance(op, Switch):
+        if isinstance(op, Switch):
             names.append(op.selector)
+        for expr in direct_expressions(op):
+            names += expr_names(expr)
     return names
 
 
@@ -101,18 +87,17 @@ def block_writes(block: Block) -> list[str]:
 
 
 def expr_names(expr: Expr) -> list[str]:
-    """Return the variables and constants that an expression reads, and `call <function>` per call.
+    """Return the variables and constants that an expression reads, with repetitions.
 
-    The names are in the order of `subexpressions` (parents first), with repetitions; an array
-    element gives the name of its array.
+    The names are in the order of `subexpressions` (parents first); an array element gives the name
+    of its array.
     """
-    names: list[str] = []
-    for part in subexpressions(expr):
-        if isinstance(part, (Ref, Item)):
-            names.append(part.name)
-        elif isinstance(part, Call):
-            names.append(f"call {part.function}")
-    return names
+    return [part.name for part in subexpressions(expr) if isinstance(part, (Ref, Item))]
+
+
+def expr_functions(expr: Expr) -> list[str]:
+    """Return the functions that an expression calls, in the order of `subexpressions`, repeated."""
+    return [part.function for part in subexpressions(expr) if isinstance(part, Call)]
 
 
 def subexpressions(expr: Expr) -> Sequence[Expr]:
@@ -139,11 +124,17 @@ def subexpressions(expr: Expr) -> Sequence[Expr]:
 
 
 def names_used(blocks: Iterable[Block]) -> set[str]:
-    """Return the set of the names that some blocks read or write, by `block_names`.
+    """Return the variables and constants that some blocks read or write.
 
-    A call counts as the name `call <function>`; blocks of RunBlock are not entered.
+    They are those of `block_reads` and `block_writes`; blocks of RunBlock are not entered.
     """
-    return {name for block in blocks for name in block_names(block)}
+    return {name for block in blocks for name in (*block_reads(block), *block_writes(block))}
+
+
+def called_functions(blocks: Iterable[Block]) -> set[str]:
+    """Return the functions that some blocks call; blocks of RunBlock are not entered."""
+    ops = (op for block in blocks for op in walk_ops(block))
+    return {name for op in ops for expr in direct_expressions(op) for name in expr_functions(expr)}
 
 
 def called_blocks(block: Block) -> list[str]:
@@ -163,50 +154,6 @@ def reachable_blocks(name: str, blocks: Mapping[str, Block]) -> set[str]:
             result.add(block_name)
             stack += called_blocks(blocks[block_name])
     return result
-
-
-def substitute_variable(block: Block, name: str, constant: int) -> Block:
-    """Return a block with a literal in place of each read of a whole-number variable.
-
-    Targets and arrays keep their names. The block may hold assignments and stores only; raises
-    TypeError for another operation.
-    """
-    ops: list[Op] = []
-    for op in block:
-        match op:
-            case Assign(target, value, key):
-                ops.append(Assign(target, _substitute_in_expr(value, name, constant), key))
-            case Store(array, index, value):
-                parts = (_substitute_in_expr(part, name, constant) for part in (index, value))
-                ops.append(Store(array, *parts))
-            case _:
-                raise TypeError(f"neither an assignment nor a store: {op!r}")
-    return tuple(ops)
-
-
-def _substitute_in_expr(expr: Expr, name: str, constant: int) -> Expr:
-    """Return an expression with a literal in place of each read of the variable `name`."""
-
-    def part(inner: Expr) -> Expr:
-        return _substitute_in_expr(inner, name, constant)
-
-    match expr:
-        case Ref(variable):
-            return Value(constant) if variable == name else expr
-        case Item(array, index, is_whole):
-            return Item(array, part(index), is_whole)
-        case Unary(operator, operand):
-            return Unary(operator, part(operand))
-        case Binary(operator, left, right):
-            return Binary(operator, part(left), part(right))
-        case Compare(operator, left, right):
-            return Compare(operator, part(left), part(right))
-        case Select(condition, then, other):
-            return Select(part(condition), part(then), part(other))
-        case Call(function, arguments):
-            return Call(function, tuple(part(argument) for argument in arguments))
-        case Value():
-            return expr
 
 
 def negate_condition(condition: Expr) -> Expr:

@@ -23,7 +23,7 @@ CONTRACTS: Mapping[str, frozenset[str]] = {
     "derive": frozenset({"derived", "work"}),
     "equations": frozenset({"equation", "work"}),
     "equations_": frozenset({"equation", "work"}),
-    "evaluate_tables": frozenset({"discrete", "work"}),
+    "evaluate_tables": frozenset({"discrete", "memory", "work"}),
     "guards_": WORK_ONLY,
     "half_": WORK_ONLY,
     "invariants": frozenset({"check", "work"}),

@@ -1,8 +1,9 @@
 """Checks of assignment: on some path a work variable is assigned before each of its reads.
 
 A forward analysis follows each entry through all blocks that it runs. After a branch it holds what
-either arm assigns, so a read that fails has no path on which its variable has a value of this step.
-Reads for which only some paths have one are those of `find_unassigned_reads`; C sets these to 0.
+either arm assigns, and at the beginning of a loop what its body assigns. So a read that fails has
+no path on which its variable has a value of this step. Reads for which only some paths have one are
+those of `find_unassigned_reads`; C sets these to 0.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from collections.abc import Iterator
 from language.ir.ops import Assign, Block, Branch, Count, Loop, Op, RunBlock, Store, Switch
 from language.ir.program import STEP_INTERFACE, Program
 from language.ir.rewrite_ops import direct_expressions
-from language.ir.traversal import block_reads, block_writes, expr_names
+from language.ir.traversal import block_reads, block_writes, expr_names, reachable_blocks
 from language.ircheck.violation import Violation, operation_place
 
 NameSet = frozenset[str]
@@ -93,6 +94,12 @@ class _AssignmentAnalysis:
             assigned = self._follow_op(name, op, assigned)
         return assigned
 
+    def _written_by(self, body: Block) -> NameSet:
+        """Return the names that a turn of a loop may assign, for the turns after it."""
+        blocks = {**self.program.blocks, "": body}
+        reached = reachable_blocks("", blocks)
+        return frozenset(name for inner in reached for name in block_writes(blocks[inner]))
+
     def _follow_op(self, name: str, op: Op, assigned: NameSet) -> NameSet:
         """Return the names that are assigned after an operation."""
         match op:
@@ -103,8 +110,9 @@ class _AssignmentAnalysis:
             case Switch(_, cases):
                 ends = [self._follow(name, block, assigned) for _, block in cases]
                 return assigned.union(*ends)
-            case Loop(_, index, body):
-                return self._follow(name, body, assigned | {index})
+            case Loop(count, index, body):
+                earlier = self._written_by(body) if count > 1 else frozenset[str]()
+                return self._follow(name, body, assigned | earlier | {index})
             case RunBlock(called):
                 return self._follow_named(called, assigned)
         return assigned

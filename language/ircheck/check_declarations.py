@@ -9,6 +9,7 @@ from collections.abc import Collection, Iterable, Iterator
 from language.ir.ops import Assign
 from language.ir.program import Function, Program, ValueType
 from language.ir.traversal import names_used
+from language.ircheck.check_assignment import INPUT_PREFIXES
 from language.ircheck.check_expression import ExpressionChecker
 from language.ircheck.violation import Rule, Violation, operation_place
 
@@ -21,8 +22,8 @@ VARIABLE_GROUPS = frozenset(
 """Groups of variables (language/ir/program.py)."""
 CONSTANT_GROUPS = frozenset(["axis", "calibration", "constant", "derived", "solved"])
 """Groups of constants."""
-INTERFACE_GROUPS = ("input.", "is_new.")
-"""Groups of variables that stay although nothing reads them: callers set them."""
+INTERFACE_GROUPS = ("input.", "is_new.", *INPUT_PREFIXES)
+"""Prefixes of variables that stay although nothing reads them: callers set them."""
 MAX_FAULTS = 32
 """Number of bits of the word of faults."""
 

@@ -37,7 +37,10 @@ def check_operations(program: Program) -> Iterator[Violation]:
 
 
 def _check_calls(program: Program) -> Iterator[Violation]:
-    """Yield the violations of runs of blocks: missing blocks, cycles, unreached blocks."""
+    """Yield the violations of runs of blocks: missing blocks, cycles, unreached blocks.
+
+    Back ends run each block of a Program without modes.
+    """
     calls = {name: called_blocks(block) for name, block in program.blocks.items()}
     has_missing = False
     for name, called in calls.items():
@@ -52,7 +55,7 @@ def _check_calls(program: Program) -> Iterator[Violation]:
         if name in below:
             yield Violation("reference", f"block {name}", "it runs itself")
             return
-        if name in ENTRIES:
+        if name in ENTRIES or not program.modes:
             reached |= {name} | below
     for name in calls:
         if name not in reached:

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from fractions import Fraction
 
 from language.expressions.syntax_tree import names
 from language.ir.ops import Assign, Block, Ref
 from language.ir.program import Program, Variable
 from language.lowering.expressions import lower_expression
-from language.lowering.program_builder import finalise_program
+from language.lowering.program_builder import FORMULA_RESULT, formula_program
 from language.model.declaration import Formula
 from language.model.system import Connection, Scenario, System
-
-WIRE_RESULT = "wire.value"
-"""The variable that each block sets."""
 
 
 def wire_formulas(system: System, scenario: Scenario) -> dict[str, Formula]:
@@ -55,31 +51,17 @@ def output_block(name: str) -> str:
 def wires_program(formulas: Mapping[str, Formula], truths: frozenset[str]) -> Program:
     """Return a Program with one block for each formula, which reads `signal.<name>`.
 
-    The keys of `formulas` are the names of the blocks. Each block sets `wire.value`. The Program is
-    named `wires` and computes in float64. `truths` are the signals of type bool; all others are
+    The keys of `formulas` are the names of the blocks. Each block sets FORMULA_RESULT. The Program
+    is named `wires`. `truths` are the signals of type bool; all others are
     real.
     """
     read = {name.path for formula in formulas.values() for name in names(formula.tree)}
     known = {name: Ref(f"signal.{name}") for name in read}
     blocks: dict[str, Block] = {
-        key: (Assign(WIRE_RESULT, lower_expression(formula.tree, known), formula.key),)
+        key: (Assign(FORMULA_RESULT, lower_expression(formula.tree, known), formula.key),)
         for key, formula in formulas.items()
     }
     variables = [
         Variable(f"signal.{name}", "truth" if name in truths else "real") for name in sorted(read)
     ]
-    program = Program(
-        name="wires",
-        number_type="float64",
-        period=None,
-        major_step=Fraction(1),
-        constants=(),
-        variables=(*variables, Variable(WIRE_RESULT, "real")),
-        outputs=(),
-        modes=(),
-        transitions=(),
-        faults=(),
-        functions=(),
-        blocks=blocks,
-    )
-    return finalise_program(program, tuple(blocks), keep=(WIRE_RESULT,))
+    return formula_program("wires", variables, blocks)

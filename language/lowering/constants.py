@@ -30,7 +30,7 @@ from language.lowering.program_parameters import (
     parameter_order,
 )
 from language.lowering.wait_ticks import seconds_to_ticks, tunable_waits
-from language.model.automaton import Automaton
+from language.model.automaton import Automaton, Transition
 from language.model.declaration import Formula
 from language.numerics.evaluate import ARITHMETIC, Scalar, evaluate
 from language.text.diagnostic import Problems, SpecError
@@ -144,6 +144,14 @@ def evaluate_constant(
         )
         raise SpecError(problems.reported)
     return value
+
+
+def wait_seconds(transition: Transition, automaton: Automaton) -> Fraction:
+    """Return the wait of a transition [s], exactly; 0 without `wait`.
+
+    Raises SpecError like `evaluate_exactly`.
+    """
+    return evaluate_exactly(transition.wait, automaton) if transition.wait else Fraction(0)
 
 
 def evaluate_exactly(formula: Formula, automaton: Automaton) -> Fraction:

@@ -9,7 +9,6 @@ guards.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from language.expressions.syntax_tree import (
@@ -40,9 +39,10 @@ from language.ir.ops import (
 from language.ir.program import ValueType, Variable
 from language.lowering.constants import evaluate_exactly
 from language.lowering.expressions import NameBindings, lower_expression
-from language.model.automaton import Automaton, Mode
+from language.model.automaton import Automaton
 from language.model.declaration import Formula
 from language.model.truth_table import truth_table_formulas
+from language.model.used_names import mode_formulas
 from language.text.diagnostic import Problems
 from language.typecheck.infer import TypeChecker
 from language.typecheck.name_environment import NameEnvironment
@@ -79,29 +79,6 @@ class SampledDelay:
     def oldest_index(self) -> str:
         """The variable `memory.oldest_<number>`: the index of the oldest value in the buffer."""
         return f"memory.oldest_{self.number}"
-
-
-def mode_formulas(mode: Mode) -> Iterator[Formula]:
-    """Yield all formulas of a mode: the equations, then those of `action_formulas`."""
-    yield from mode.equations.values()
-    yield from action_formulas(mode)
-
-
-def action_formulas(mode: Mode) -> Iterator[Formula]:
-    """Yield the formulas of a mode other than its equations and balances.
-
-    They are updates, entries, exits and process noise, then guard, reset and `until` of a rewind of
-    each transition. Waits are left out.
-    """
-    for stage in (mode.update, mode.entry, mode.exit):
-        yield from stage.values()
-    if mode.observer:
-        yield from mode.observer.process_noise.values()
-    for transition in mode.transitions:
-        yield transition.when
-        yield from transition.reset.values()
-        if transition.rewind:
-            yield transition.rewind.until
 
 
 def memory_calls_by_key(

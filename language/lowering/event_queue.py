@@ -21,9 +21,9 @@ from language.ir.ops import (
     Expr,
     FaultBit,
     Item,
-    Op,
     Ref,
     Store,
+    Value,
     add,
     integer,
 )
@@ -74,14 +74,17 @@ def enqueue_input_events(chart: Chart) -> Block:
     The queue is emptied before; events come in the order of their declaration. Without an event the
     current event is 0.
     """
-    ops: list[Op] = [Assign(QUEUE_HEAD.name, integer(0)), Assign(QUEUE_TAIL.name, integer(0))]
-    for signal in chart.events.values():
-        if signal.is_input:
-            ops.append(Branch(Ref(f"input.{signal.name}"), _append_event(signal.number)))
+    enqueue = [
+        Branch(Ref(f"input.{signal.name}"), _append_event(signal.number))
+        for signal in chart.events.values()
+        if signal.is_input
+    ]
     return (
-        *ops,
+        Assign(QUEUE_HEAD.name, integer(0)),
+        Assign(QUEUE_TAIL.name, integer(0)),
+        *enqueue,
         Assign(CURRENT_EVENT.name, integer(0)),
-        Branch(HAS_WAITING_EVENT, dequeue_event()),
+        *((Branch(HAS_WAITING_EVENT, dequeue_event()),) if enqueue else ()),
     )
 
 
@@ -115,14 +118,15 @@ def dequeue_event() -> Block:
     )
 
 
-def event_condition(chart: Chart, transition: Transition) -> Expr | None:
+def event_condition(chart: Chart, transition: Transition, capacity: int) -> Expr | None:
     """Return the condition that the current event is one of a transition's events.
 
-    The result is None for a transition without events.
+    The result is None for a transition without events. If the queue has no places, no event occurs.
     """
     found: Expr | None = None
     for name in transition.events:
-        here = Compare("==", CURRENT_EVENT, integer(chart.events[name].number))
+        is_current = Compare("==", CURRENT_EVENT, integer(chart.events[name].number))
+        here = is_current if capacity else Value(False)
         found = here if found is None else Binary("or", found, here)
     return found
 

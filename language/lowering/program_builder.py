@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Mapping
+from fractions import Fraction
 
 from language.expressions.units import Dimension
 from language.ir.annotate_types import annotate_types
@@ -29,7 +30,7 @@ from language.ir.program import (
 from language.ir.rewrite_ops import remove_empty_switches
 from language.ir.root_region import CHART
 from language.ir.round_literals import round_program
-from language.ir.traversal import block_names, names_used, reachable_blocks
+from language.ir.traversal import called_functions, names_used, reachable_blocks
 from language.lowering.expressions import WHOLE_TYPES, lower_assigned_value
 from language.lowering.invariants import invariant_infos
 from language.lowering.program_parameters import cast_to_type
@@ -43,6 +44,8 @@ from language.typecheck.types import EnumType, IntType
 
 INACTIVE = "inactive"
 """The name of the mode of a region inside a mode while that mode is not active."""
+FORMULA_RESULT = "work.value"
+"""The variable that a block of a Program of formulas sets."""
 
 
 def input_variables(automaton: Automaton, group: str) -> list[Variable]:
@@ -267,6 +270,30 @@ def assemble_program(
     )
 
 
+def formula_program(
+    name: str, variables: Iterable[Variable], blocks: Mapping[str, Block]
+) -> Program:
+    """Return a Program without modes, of which each block is run alone and computes in float64.
+
+    A block sets FORMULA_RESULT, which is added to `variables`, or one of these.
+    """
+    program = Program(
+        name=name,
+        number_type="float64",
+        period=None,
+        major_step=Fraction(1),
+        constants=(),
+        variables=(*variables, Variable(FORMULA_RESULT, "real")),
+        outputs=(),
+        modes=(),
+        transitions=(),
+        faults=(),
+        functions=(),
+        blocks=blocks,
+    )
+    return finalise_program(program, tuple(blocks))
+
+
 def mode_infos(region: Region) -> tuple[ModeInfo, ...]:
     """Return the modes of a region with their numbers, in the order of the file.
 
@@ -305,7 +332,7 @@ def finalise_program(
         if not more:
             break
         constants += [c for c in program.constants if c.name in more]
-    functions = _used_functions(used, program.number_type)
+    functions = _used_functions(called_functions(blocks.values()), program.number_type)
     interface = ("input.", "is_new.")
     variables = [v for v in program.variables if v.name in used or v.name.startswith(interface)]
     variables = _remove_unused_before(variables, blocks)
@@ -338,14 +365,14 @@ def _remove_unused_before(variables: list[Variable], blocks: dict[str, Block]) -
     return [v for v in variables if not v.name.startswith("before.") or v.name in targets]
 
 
-def _used_functions(used: set[str], number: NumberType) -> tuple[Function, ...]:
-    """Return the elementary functions whose `call` is in `used`, with those that these call."""
+def _used_functions(called: set[str], number: NumberType) -> tuple[Function, ...]:
+    """Return the elementary functions among `called`, with those that these call."""
     known = FUNCTIONS_BY_TYPE[number]
-    stack = [name.removeprefix("call ") for name in used if name.startswith("call ")]
+    stack = [*called]
     found: set[str] = set()
     while stack:
         name = stack.pop()
         if name in known and name not in found:
             found.add(name)
-            stack += [called.removeprefix("call ") for called in block_names(known[name].body)]
+            stack += called_functions([known[name].body])
     return tuple(function for name, function in known.items() if name in found)

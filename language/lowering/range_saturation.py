@@ -202,7 +202,7 @@ def _may_be_converted(automaton: Automaton, variable: Input | State, value: Expr
     return any(
         isinstance(part, FunctionCall) and part.function == "floor"
         for mode in automaton.all_modes
-        for formulas in (mode.update, mode.entry, mode.exit, *(t.reset for t in mode.transitions))
+        for formulas in (mode.update, *mode.jump_assignments)
         if variable.name in formulas
         for part in walk(formulas[variable.name].tree)
     )

@@ -32,6 +32,7 @@ from language.ir.ops import (
     subtract,
 )
 from language.ir.program import Variable, value_type
+from language.lowering.action_stages import TransitionStages, stage_reads, transition_stages
 from language.lowering.constants import evaluate_exactly
 from language.lowering.expressions import variable_bindings
 from language.lowering.program_builder import any_fired_condition
@@ -81,8 +82,12 @@ class Rollback:
     @property
     def names_read_by_jump(self) -> list[str]:
         """The names that the exit and the reset read, with repetitions."""
-        written = (*self.source.exit.values(), *self.transition.reset.values())
-        return [name for formula in written for name in formula.reads]
+        return stage_reads(self.stages.before)
+
+    @property
+    def stages(self) -> TransitionStages:
+        """The stages of the transition."""
+        return transition_stages(self.automaton, self.transition)
 
 
 @cache_on_owner
@@ -160,10 +165,9 @@ def recorded_inputs(automaton: Automaton) -> dict[str, Ref]:
     read: set[str] = set()
     for rollback in rollbacks_of(automaton):
         target = automaton.target_mode(rollback.transition)
-        entry_reads = [name for formula in target.entry.values() for name in formula.reads]
         own_reads = [*rollback.rewind.until.reads, *rollback.names_read_by_jump]
         read |= _transitive_reads(rollback.source, own_reads)
-        read |= _transitive_reads(target, entry_reads)
+        read |= _transitive_reads(target, stage_reads(rollback.stages.after))
         read |= {*automaton.model.inputs} if automaton.model else set()
     names = variable_bindings(automaton, "input")
     recorded = {name: names[name] for name in automaton.inputs if name in read}

@@ -16,7 +16,7 @@ from language.ir.ops import (
     integer,
 )
 from language.ir.program import TransitionInfo
-from language.lowering.constants import evaluate_exactly
+from language.lowering.constants import wait_seconds
 from language.lowering.event_tolerance import is_instantaneous
 from language.lowering.guard_variable_names import guard_slot
 from language.lowering.tick_history import rollbacks_of
@@ -42,9 +42,8 @@ def transition_infos(automaton: Automaton, problems: Problems) -> tuple[Transiti
     for mode in automaton.all_modes:
         for k, transition in enumerate(mode.transitions):
             wait = Fraction(0)
-            if transition.wait:
-                with problems.collect_errors():
-                    wait = evaluate_exactly(transition.wait, automaton)
+            with problems.collect_errors():
+                wait = wait_seconds(transition, automaton)
             ticks = seconds_to_ticks(automaton, wait) if automaton.period else 0
             tunable = tunable_wait(automaton, transition.wait)
             if transition.wait and wait < 0:

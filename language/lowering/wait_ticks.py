@@ -7,13 +7,12 @@ first, and the count could then be one tick too large.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from fractions import Fraction
 
 from language.expressions.syntax_tree import Name
 from language.ir.analysis_cache import cache_on_owner
 from language.ir.program import MAX_TIMER_TICKS
-from language.model.automaton import Automaton, Transition
+from language.model.automaton import Automaton
 from language.model.declaration import Formula, Parameter, Range
 from language.model.used_names import names_read_by
 from language.text.diagnostic import Problems
@@ -37,7 +36,7 @@ def tunable_wait(automaton: Automaton, wait: Formula | None) -> str | None:
 @cache_on_owner
 def tunable_waits(automaton: Automaton) -> frozenset[str]:
     """Return the names of the tunable parameters that are the wait of some transition."""
-    waits = (tunable_wait(automaton, each.wait) for each in _all_transitions(automaton))
+    waits = (tunable_wait(automaton, each.wait) for each in automaton.all_transitions)
     return frozenset(name for name in waits if name)
 
 
@@ -96,9 +95,3 @@ def check_tunable_waits(automaton: Automaton, problems: Problems) -> None:
         if (parameter.range and parameter.range[0] < 0) or most > MAX_WAIT_TICKS:
             label = f"`{name}` is a wait: its range is within 0 to {MAX_WAIT_TICKS} ticks"
             problems.error("wait", parameter.span, label)
-
-
-def _all_transitions(automaton: Automaton) -> Iterator[Transition]:
-    """Yield the transitions of all modes, in the order of the file."""
-    for mode in automaton.all_modes:
-        yield from mode.transitions

@@ -180,6 +180,16 @@ class Mode:
         name = self.name if self.region == CHART else f"{self.region}_{self.name}"
         return name.replace(".", "_")
 
+    @property
+    def has_entry_or_exit(self) -> bool:
+        """Whether the mode has entry or exit actions."""
+        return bool(self.entry or self.exit)
+
+    @property
+    def jump_assignments(self) -> tuple[Mapping[str, Formula], ...]:
+        """The resets of its transitions, its entry and its exit, each by variable."""
+        return (*(transition.reset for transition in self.transitions), self.entry, self.exit)
+
 
 @dataclass(frozen=True)
 class Region:
@@ -283,6 +293,11 @@ class Automaton:
         """The modes of all regions, those of `chart` first, then the superstates."""
         inner = (mode for region in self.all_regions for mode in region.modes.values())
         return (*inner, *self.superstates)
+
+    @cached_property
+    def all_transitions(self) -> tuple[Transition, ...]:
+        """The transitions of `all_modes`, mode by mode."""
+        return tuple(transition for mode in self.all_modes for transition in mode.transitions)
 
     @cached_property
     def modes_by_key(self) -> Mapping[str, Mode]:

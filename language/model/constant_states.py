@@ -53,16 +53,12 @@ def never_varying_states(automaton: Automaton) -> frozenset[str]:
 def written_states(automaton: Automaton) -> tuple[str, ...]:
     """Return the states that a simulation writes, in the order of the file.
 
-    These are the states that vary in some mode of the region `chart` and the states that some
-    transition, also of a superstate or a parallel region, resets.
+    These are the states that vary in some mode of the region `chart` and the states that some exit,
+    reset or entry, also of a superstate or a parallel region, assigns.
     """
-    reset = {
-        n
-        for mode in automaton.all_modes
-        for transition in mode.transitions
-        for n in transition.reset
-    }
-    return tuple(n for n in automaton.states if n in ever_varying_states(automaton) or n in reset)
+    assigned = {n for mode in automaton.all_modes for part in mode.jump_assignments for n in part}
+    varying = ever_varying_states(automaton)
+    return tuple(n for n in automaton.states if n in varying or n in assigned)
 
 
 def _is_zero(mode: Mode, tree: SyntaxTree) -> bool:

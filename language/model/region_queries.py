@@ -100,6 +100,15 @@ def transitions_by_priority(mode: Mode) -> list[tuple[int, Transition]]:
     return sorted(pairs, key=lambda pair: (pair[1].priority or 0, pair[0]))
 
 
+def earlier_by_priority(mode: Mode, transition: Transition) -> list[Transition]:
+    """Return the transitions of a mode that come before one of them by priority (rule 3a).
+
+    Raises ValueError if the transition does not belong to the mode.
+    """
+    ordered = [other for _, other in transitions_by_priority(mode)]
+    return ordered[: ordered.index(transition)]
+
+
 def attach_regions(modes: Mapping[str, Mode], regions: tuple[Region, ...]) -> dict[str, Mode]:
     """Return copies of modes, by the same names, whose `parallel_regions` are `regions`."""
     return {

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from language.expressions.syntax_tree import MEMORY_FUNCTIONS, FunctionCall, walk
 from language.ir.analysis_cache import cache_on_owner
 from language.model.automaton import Automaton, Mode, Transition
-from language.model.region_queries import transitions_by_priority
+from language.model.region_queries import earlier_by_priority
 from language.model.statechart import ChartNode
 
 
@@ -31,8 +31,7 @@ def preceding_transitions(
     (`covers_events`) are returned; guards and waits are not considered. Raises ValueError if the
     transition does not belong to the mode.
     """
-    position = [other for _, other in transitions_by_priority(mode)].index(transition)
-    result = [other for _, other in transitions_by_priority(mode)[:position]]
+    result = earlier_by_priority(mode, transition)
     chart, node = automaton.statechart, node_of(automaton, mode)
     if chart and node and chart.order == "outer_first":
         result += [
@@ -80,9 +79,9 @@ def possible_events(automaton: Automaton) -> frozenset[str]:
     Without a chart only the raised events are returned.
     """
     signals = automaton.statechart.events if automaton.statechart else {}
-    raised = (other.raises for mode in automaton.all_modes for other in mode.transitions)
     inputs = (name for name, signal in signals.items() if signal.is_input)
-    return frozenset((*inputs, *(name for names in raised for name in names)))
+    raised = (name for transition in automaton.all_transitions for name in transition.raises)
+    return frozenset((*inputs, *raised))
 
 
 def is_guard_portable(transition: Transition) -> bool:

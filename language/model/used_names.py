@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from language.expressions.syntax_tree import names
-from language.model.automaton import Automaton, Balance, Transition
+from language.model.automaton import Automaton, Balance, Mode, Transition
 from language.model.declaration import Formula
 from language.text.diagnostic import Span
 
@@ -46,3 +46,26 @@ def formulas_of(automaton: Automaton, include_waits: bool = True) -> Iterator[Fo
             if isinstance(part, Transition) and not include_waits:
                 del fields["wait"]
             stack += fields.values()
+
+
+def mode_formulas(mode: Mode) -> Iterator[Formula]:
+    """Yield all formulas of a mode: the equations, then those of `action_formulas`."""
+    yield from mode.equations.values()
+    yield from action_formulas(mode)
+
+
+def action_formulas(mode: Mode) -> Iterator[Formula]:
+    """Yield the formulas of a mode other than its equations and balances.
+
+    They are updates, entries, exits and process noise, then guard, reset and `until` of a rewind of
+    each transition. Waits are left out.
+    """
+    for stage in (mode.update, mode.entry, mode.exit):
+        yield from stage.values()
+    if mode.observer:
+        yield from mode.observer.process_noise.values()
+    for transition in mode.transitions:
+        yield transition.when
+        yield from transition.reset.values()
+        if transition.rewind:
+            yield transition.rewind.until

@@ -17,7 +17,7 @@ import dataclasses
 from language.ir.formula_name import format_formula
 from language.ir.ops import Assign, Binary, Branch, Compare, Expr, Op, Ref, Unary
 from language.ir.program import Program, Variable
-from language.ir.traversal import block_writes, expr_names
+from language.ir.traversal import block_writes, expr_functions, expr_names
 from language.passes.common_subexpressions import CHEAP_FUNCTIONS
 from language.passes.hoisting import CONSTANT_PREFIX, HoistedValues, replace_hoistable
 
@@ -71,7 +71,7 @@ def _recompute_if_changed(program: Program, ops: list[Assign]) -> tuple[list[Ass
     found: list[Op] = []
     for op in ops:
         read = dict.fromkeys(expr_names(op.value))
-        if not any(name.startswith("call ") and name[5:] not in CHEAP_FUNCTIONS for name in read):
+        if set(expr_functions(op.value)) <= {*CHEAP_FUNCTIONS}:
             found.append(op)
             continue
         is_due: Expr = Unary("not", Ref("memory.started"))

@@ -57,7 +57,7 @@ def fold_parameters(program: Program) -> Program:
         value = float(evaluate(expr, values, number))
         if not math.isfinite(value):
             return expr
-        is_fixed = all(name.startswith((CONSTANT_PREFIX, "call ")) for name in expr_names(expr))
+        is_fixed = all(name.startswith(CONSTANT_PREFIX) for name in expr_names(expr))
         ref = found.ref_to(CONSTANT_PREFIX if is_fixed else "derived.", expr)
         values[ref.name] = value
         return ref

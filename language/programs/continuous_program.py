@@ -35,7 +35,6 @@ from language.integration.vector_field import (
     VectorField,
     field_blocks,
     field_variables,
-    lower_single_region_step,
 )
 from language.ir.ops import Assign, Binary, Block, Expr, Ref, RunBlock, add, integer, multiply
 from language.ir.program import (
@@ -72,8 +71,9 @@ from language.lowering.program_builder import (
     state_variables,
 )
 from language.lowering.program_parameters import constant_bindings
-from language.lowering.transition_metadata import infos_of_mode, transition_infos
+from language.lowering.transition_metadata import transition_infos
 from language.model.automaton import Automaton, Mode, Transition
+from language.programs.continuous_micro_step import TransitionSelection, micro_step_blocks
 from language.programs.engine_blocks import engine_blocks
 from language.programs.major_step import (
     LIVELOCK,
@@ -87,11 +87,6 @@ from language.programs.major_step import (
     major_step_blocks,
     major_step_variables,
     wait_timers_of,
-)
-from language.programs.parallel_regions import (
-    TransitionSelection,
-    lower_parallel_step,
-    parallel_blocks,
 )
 from language.text.diagnostic import Problems
 
@@ -120,7 +115,7 @@ def lower_continuous_automaton(
         **flows,
         **_continuous_step(field, method, flows),
         **major_step_blocks(field, waits, (RECORD_AGE.name,) if histories else ()),
-        **_mode_blocks(field, known, transitions, _selection(automaton, transitions, waits)),
+        **_mode_blocks(field, known, _selection(automaton, transitions, waits)),
         **invariant_blocks(automaton, known),
         **engine_blocks(field, known, waits, histories),
     }
@@ -199,18 +194,16 @@ def _continuous_step(
 def _mode_blocks(
     field: VectorField,
     known: NameBindings,
-    infos: tuple[TransitionInfo, ...],
     selection: TransitionSelection,
 ) -> dict[str, Block]:
     """Return `equations_<mode>` and `jump_<mode>` of each mode, and those of parallel regions."""
-    blocks: dict[str, Block] = {}
+    steps, blocks = micro_step_blocks(field, selection), dict[str, Block]()
     for mode in field.automaton.modes.values():
         ops = lower_equations(mode, dict(known), "equation.", field.key_prefix)
         blocks[f"equations_{mode.name}"] = tuple(ops)
-        blocks[f"jump_{mode.name}"] = _jump_block(field, mode, infos, selection)
-    if field.automaton.regions:
-        blocks.update(parallel_blocks(field, selection))
-    return blocks
+        step = steps.pop(f"jump_{mode.name}")
+        blocks[f"jump_{mode.name}"] = (RunBlock(f"guards_{mode.name}"), *step)
+    return blocks | steps
 
 
 def _input_parabola(name: str) -> Expr:
@@ -247,6 +240,7 @@ def _selection(
     """Return how a micro-step selects transitions; a wait must be over for its transition.
 
     After a transition the timers and edges of the source are reset and those of the target start.
+    Without parallel regions the number of the transition is stored then.
     """
     by_key = {info.key: info for info in infos}
     begins, ends = begin_blocks(waits), end_blocks(waits)
@@ -255,48 +249,32 @@ def _selection(
         """Return the data of a transition."""
         return by_key[f"{automaton.name} {transition.key}"]
 
-    def enabled(transition: Transition, slot: str) -> Expr:
-        """Return the condition of a transition: its guard and the end of its wait, if any."""
-        guard, info = Ref(f"work.guard_{slot}"), info_of(transition)
-        return Binary("and", guard, is_wait_over(info)) if info.timer else guard
+    def enabled(mode: Mode) -> dict[int, Expr]:
+        """Return the conditions of transitions: the guard and the end of the wait, if any."""
+        found: dict[int, Expr] = {}
+        for k, info in enumerate(map(info_of, mode.transitions)):
+            guard = Ref(f"work.guard_{info.slot}")
+            found[k] = Binary("and", guard, is_wait_over(info)) if info.timer else guard
+        return found
+
+    def fire(transition: Transition) -> Block:
+        """Return the operations after the change of mode."""
+        info = info_of(transition)
+        fired = Assign(fired_variable(info.region), integer(info.number), info.key)
+        return (
+            *(() if automaton.regions else (fired,)),
+            *block_of_mode(ends, automaton.source_mode(transition)),
+            *reset_levels(automaton, automaton.source_mode(transition)),
+            *block_of_mode(begins, automaton.target_mode(transition)),
+        )
 
     return TransitionSelection(
         block_prefix="jump",
         selected_variable=fired_variable,
         number_of=lambda transition: info_of(transition).number,
-        enabled_condition=enabled,
-        after_switch=lambda t: (
-            *block_of_mode(ends, automaton.source_mode(t)),
-            *reset_levels(automaton, automaton.source_mode(t)),
-            *block_of_mode(begins, automaton.target_mode(t)),
-        ),
+        enabled=enabled,
+        after_switch=fire,
     )
-
-
-def _jump_block(
-    field: VectorField,
-    mode: Mode,
-    infos: tuple[TransitionInfo, ...],
-    selection: TransitionSelection,
-) -> Block:
-    """Return the micro-step of a mode of the chart: its guards, then at most one transition.
-
-    With parallel regions each region takes at most one transition.
-    """
-    guards = RunBlock(f"guards_{mode.name}")
-    if mode.parallel_regions:
-        return (guards, *lower_parallel_step(field, mode, selection))
-    enabled: dict[int, Expr] = {}
-    fired: dict[int, Block] = {}
-    for k, (transition, info) in enumerate(
-        zip(mode.transitions, infos_of_mode(field.automaton, mode, infos), strict=True)
-    ):
-        enabled[k] = selection.enabled_condition(transition, info.slot)
-        fired[k] = (
-            Assign("memory.fired", integer(info.number), info.key),
-            *selection.after_switch(transition),
-        )
-    return (guards, *lower_single_region_step(field, mode, enabled, fired))
 
 
 def _guard_memory(automaton: Automaton) -> dict[str, NameBindings]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from language.integration.vector_field import (
     VectorField,
-    lower_entry_at_point,
     run_block_by_mode,
     set_point_time,
     set_point_to_state,
+    stage_bindings,
 )
 from language.ir.ops import (
     Assign,
@@ -23,7 +23,7 @@ from language.ir.ops import (
     integer,
     real,
 )
-from language.lowering.action_stages import initial_entry_assignments
+from language.lowering.action_stages import initial_stages, lower_transition
 from language.lowering.constants import derive_block
 from language.lowering.continuous_delay import (
     RECORD_AGE,
@@ -100,7 +100,9 @@ def _start_block(
 ) -> Block:
     """Return the block `start`: start values, initial modes, timers and entries (rule 16b)."""
     automaton = field.automaton
-    begins = begin_blocks(waits)
+    begins, initial = begin_blocks(waits), automaton.modes[automaton.initial]
+    stages = initial_stages((0, r.modes[r.initial]) for r in automaton.all_regions)
+    entries = lower_transition(automaton, stages, stage_bindings(field, [initial]))
     return (
         *lower_initial_values(automaton, known, field.key_prefix),
         *enter_initial_modes(automaton, "memory.mode"),
@@ -110,9 +112,8 @@ def _start_block(
         *((Assign(RECORD_AGE.name, real(0.0)),) if delays else ()),
         Assign("memory.time", real(0.0)),
         Assign("memory.started", Value(True)),
-        *lower_entry_at_point(
-            field, automaton.modes[automaton.initial], initial_entry_assignments(automaton)
-        ),
+        *(set_point_to_state(field) if entries else ()),
+        *entries,
     )
 
 

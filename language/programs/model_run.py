@@ -19,11 +19,9 @@ from language.integration.crossing_location import (
 )
 from language.integration.method_selection import build_method
 from language.integration.vector_field import (
-    ALWAYS,
     VectorField,
     field_blocks,
     field_variables,
-    lower_single_region_step,
     run_block_by_mode,
     set_point_to_state,
 )
@@ -49,19 +47,16 @@ from language.ir.root_region import CHART
 from language.lowering.delay_buffers import find_memory_call
 from language.lowering.event_tolerance import merge_time
 from language.lowering.expressions import variable_bindings
+from language.lowering.guard_variable_names import guard_slot
 from language.lowering.linearisation import LinearisationPoint, linearise_model
 from language.lowering.program_builder import enter_initial_modes
 from language.lowering.program_parameters import cast_to_type, constant_bindings
 from language.lowering.range_saturation import saturate_written_states
+from language.lowering.transition_choice import without_last_test
 from language.model.automaton import Automaton, Mode, ModelRun
 from language.model.constant_states import written_states
-from language.model.region_queries import transitions_by_priority
 from language.numerics.evaluate import Scalar
-from language.programs.parallel_regions import (
-    TransitionSelection,
-    lower_parallel_step,
-    parallel_blocks,
-)
+from language.programs.continuous_micro_step import TransitionSelection, micro_step_blocks
 from language.text.diagnostic import Problems
 
 EVENT_LIMIT = "event_limit"
@@ -239,7 +234,7 @@ def _substep_with_events(
 
 def _refuse_actions(automaton: Automaton, model: Automaton, problems: Problems) -> None:
     """Report a model with discrete variables, entry or exit actions, which a run cannot carry."""
-    acting = any(mode.entry or mode.exit for mode in model.all_modes)
+    acting = any(mode.has_entry_or_exit for mode in model.all_modes)
     if model.discrete or acting:
         what = "discrete variables" if model.discrete else "entry or exit actions"
         label = f"a run inside a tick carries states alone: `{model.name}` has {what}"
@@ -285,37 +280,29 @@ def _settings_key(run: ModelRun) -> tuple[object, ...]:
 def _switch_blocks(field: VectorField, problems: Problems) -> dict[str, Block]:
     """Return `switch_<mode>`, one micro-step of the model; a transition with a wait is reported."""
     model = field.automaton
-    for mode in model.all_modes:
-        for transition in mode.transitions:
-            if transition.wait:
-                label = "a run inside a tick follows transitions without a wait only"
-                problems.error("run", transition.wait.span, label)
-    if not model.regions:
-        return {f"switch_{mode.name}": _switch_block(field, mode) for mode in model.modes.values()}
-    keys = [transition.key for mode in model.all_modes for transition in mode.transitions]
+    for transition in model.all_transitions:
+        if transition.wait:
+            label = "a run inside a tick follows transitions without a wait only"
+            problems.error("run", transition.wait.span, label)
+    keys = [transition.key for transition in model.all_transitions]
+
+    def enabled(mode: Mode) -> dict[int, Expr]:
+        """Return the guards of a mode.
+
+        A located crossing has a true guard, so without parallel regions one of them is true.
+        """
+        slots = [guard_slot(mode.region, k) for k in range(len(mode.transitions))]
+        guards: dict[int, Expr] = {k: Ref(f"work.guard_{slot}") for k, slot in enumerate(slots)}
+        return guards if model.regions else without_last_test(mode, guards)
+
     selection = TransitionSelection(
         block_prefix="switch",
         selected_variable=lambda region: f"work.taken_{region}",
         number_of=lambda transition: keys.index(transition.key) + 1,
-        enabled_condition=lambda transition, slot: Ref(f"work.guard_{slot}"),
+        enabled=enabled,
         after_switch=lambda transition: (),
     )
-    blocks = parallel_blocks(field, selection)
-    for mode in model.modes.values():
-        blocks[f"switch_{mode.name}"] = lower_parallel_step(field, mode, selection)
-    return blocks
-
-
-def _switch_block(field: VectorField, mode: Mode) -> Block:
-    """Return the micro-step of a mode of a model without parallel regions.
-
-    A located crossing has a true guard, so the guard of the last transition in the order of
-    priority is not tested.
-    """
-    enabled: dict[int, Expr] = {k: Ref(f"work.guard_{k}") for k in range(len(mode.transitions))}
-    for k, _ in transitions_by_priority(mode)[-1:]:
-        enabled[k] = ALWAYS
-    return lower_single_region_step(field, mode, enabled, {})
+    return micro_step_blocks(field, selection)
 
 
 def _mode_variables(model: Automaton) -> list[Variable]:

@@ -112,9 +112,6 @@ def chart_context_of(
     if automaton.statechart is None:
         return None
     infos = {info.key.partition(" ")[2]: info for info in transitions}
-    mode_transitions = [
-        transition for mode in automaton.all_modes for transition in mode.transitions
-    ]
     everywhere, now = current_bindings(automaton)
-    size = queue_capacity(automaton.statechart, mode_transitions)
+    size = queue_capacity(automaton.statechart, automaton.all_transitions)
     return ChartContext(automaton, automaton.statechart, infos, now, everywhere, size)

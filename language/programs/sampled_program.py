@@ -14,15 +14,16 @@ from language.charts.micro_step import (
     chart_blocks,
     chart_variables,
     clear_histories,
-    lower_initial_entries,
+    initial_chart_stages,
 )
 from language.ir.ops import Assign, Block, Op, RunBlock, Value, integer
 from language.ir.program import Constant, IntegrationInfo, ModeInfo, Program
 from language.ir.root_region import CHART
 from language.lowering.action_stages import (
+    bindings_of_target,
     commit_stage,
-    initial_entry_assignments,
-    lower_entry,
+    initial_stages,
+    lower_transition,
     read_stage,
 )
 from language.lowering.calibration_stamp import (
@@ -269,12 +270,13 @@ class _SampledLowering:
 
     def _initial_entries(self, initial: Mode) -> Block:
         """Return the entry actions of the initial modes."""
-        automaton = self.automaton
-        if automaton.statechart:
-            return lower_initial_entries(automaton, automaton.statechart, self.base_bindings)
-        return lower_entry(
-            automaton, initial, initial_entry_assignments(automaton), self.base_bindings
-        )
+        automaton, now = self.automaton, self.base_bindings
+        if self.chart_context:
+            stages = initial_chart_stages(self.chart_context)
+        else:
+            stages = initial_stages((0, r.modes[r.initial]) for r in automaton.all_regions)
+        read = bindings_of_target(automaton, initial, now, now)
+        return lower_transition(automaton, stages, read)
 
     def _init_block(self, has_stamps: bool) -> Block:
         """Return the block `init`, which states that nothing has started (rule 16a)."""

@@ -2,32 +2,32 @@
 
 from __future__ import annotations
 
-from collections import ChainMap
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 from language.ir.analysis_cache import cache_on_owner
 from language.ir.ops import (
     Assign,
     Block,
-    Branch,
-    Compare,
-    Count,
     Expr,
     Op,
-    Ref,
     RunBlock,
-    Switch,
     integer,
 )
 from language.ir.program import TransitionInfo, fired_variable, mode_variable
-from language.lowering.action_stages import lower_entry, lower_stage, lower_stage_of_regions
-from language.lowering.edge_detection import detect_edges, guard_memory_bindings, reset_activation
-from language.lowering.expressions import equation_bindings, lower_expression, names_read
+from language.lowering.action_stages import (
+    bindings_of_target,
+    bindings_of_targets,
+    common_stages,
+    lower_transition,
+    select_blocks,
+    transition_stages,
+)
+from language.lowering.edge_detection import reset_activation
+from language.lowering.expressions import equation_bindings
 from language.lowering.tick_history import Rollback
-from language.lowering.transition_metadata import infos_of_mode, start_run, wait_ticks
+from language.lowering.transition_choice import choose_by_priority, lower_sampled_choice
+from language.lowering.transition_metadata import infos_of_mode, start_run
 from language.model.automaton import Automaton, Mode, Transition
-from language.model.declaration import Formula
-from language.model.region_queries import transitions_by_priority
 from language.programs.rewind import (
     advance_from_crossing,
     rollback_bindings,
@@ -43,29 +43,18 @@ def lower_sampled_jump(
 ) -> Block:
     """Return the jump of a mode: edges, wait counters, then at most one transition (rules 3 and 4).
 
-    Of the enabled transitions that with the smallest priority is taken. The first tick with a true
-    guard counts 1, so a wait of N ticks is over when the counter exceeds N. With parallel regions
-    the jump sets the fired-transition variable only; `lower_sampled_commit` performs the actions
-    (rule 14). `now` are the bindings without equations.
+    With parallel regions the jump sets the fired-transition variable only; `lower_sampled_commit`
+    performs the actions (rule 14). `now` are the bindings without equations.
     """
-    everywhere = {**now, **equation_bindings(automaton, "equation.")}
-    edges = detect_edges(automaton, mode, everywhere)
-    known = ChainMap(guard_memory_bindings(automaton, mode), everywhere)
+    known = {**now, **equation_bindings(automaton, "equation.")}
     own = infos_of_mode(automaton, mode, infos)
-    counters: list[Op] = []
-    chain: Block = ()
-    for k, transition in reversed(transitions_by_priority(mode)):
-        info = own[k]
-        enabled = lower_expression(transition.when.tree, known)
-        if info.timer:
-            key = f"{automaton.name} {transition.when.key}"
-            counters.insert(0, Count(info.timer, enabled, info.timer_limit, key))
-            enabled = Compare(">", Ref(info.timer), wait_ticks(info))
-        fire: list[Op] = [Assign(fired_variable(mode.region), integer(info.number), info.key)]
+    choice = lower_sampled_choice(automaton, mode, known, own)
+    fire: dict[int, Block] = {}
+    for k, (transition, info) in enumerate(zip(mode.transitions, own, strict=True)):
+        fire[k] = (Assign(fired_variable(mode.region), integer(info.number), info.key),)
         if not automaton.regions:
-            fire = _lower_transition(automaton, transition, infos, (now, known), fire)
-        chain = (Branch(enabled, tuple(fire), chain),)
-    return (*edges, *counters, *chain)
+            fire[k] = _lower_transition(automaton, transition, infos, (now, known), fire[k])
+    return (*choice.edges, *choice.counts, *choose_by_priority(mode, choice.enabled, fire))
 
 
 def _lower_transition(
@@ -73,32 +62,28 @@ def _lower_transition(
     transition: Transition,
     infos: tuple[TransitionInfo, ...],
     bindings: tuple[Mapping[str, Expr], Mapping[str, Expr]],
-    fired_ops: list[Op],
-) -> list[Op]:
+    fired_ops: Block,
+) -> Block:
     """Return the actions of a transition in an automaton without parallel regions (rule 6).
 
     A transition with `rewind` goes back to the crossing first and advances to the present
     afterwards. `bindings` are the present ones, without equations and with them.
     """
-    source, target = automaton.source_mode(transition), automaton.target_mode(transition)
+    target = automaton.target_mode(transition)
     now, known = bindings
-    go_back: list[Op] = []
+    go_back: Block = ()
     advance: Block = ()
     if transition.rewind:
+        source = automaton.source_mode(transition)
         rollback = Rollback(automaton, source, transition, transition.rewind)
         now = rollback_bindings(automaton, now)
         known = {**now, **rollback_equation_bindings(rollback)}
-        go_back = [RunBlock(f"rollback_{rollback.block_suffix}")]
+        go_back = (RunBlock(f"rollback_{rollback.block_suffix}"),)
         advance = advance_from_crossing(rollback)
-    return [
-        *go_back,
-        *_lower_exit_and_reset(automaton, source, transition, known),
-        *_switch_mode(automaton, transition, infos),
-        *fired_ops,
-        *start_run(automaton, target),
-        *lower_entry(automaton, target, target.entry, now),
-        *advance,
-    ]
+    stages = transition_stages(automaton, transition)
+    moved = (*_switch_mode(automaton, transition, infos), *fired_ops, *start_run(automaton, target))
+    read = bindings_of_target(automaton, target, now, known)
+    return (*go_back, *lower_transition(automaton, stages, read, moved), *advance)
 
 
 def lower_sampled_commit(
@@ -110,67 +95,26 @@ def lower_sampled_commit(
     """Return the actions of the transitions that the regions have selected (rule 6).
 
     They are exits, resets, changes of mode (with timers and runs) and entries; each stage of all
-    regions reads one snapshot. `evaluate_equations` evaluates the equations of the new modes; it
-    runs before the entries if an entry of any mode reads an equation. `now` are the bindings
-    without equations.
+    regions reads one snapshot. `evaluate_equations` evaluates the equations of the new modes. `now`
+    are the bindings without equations.
     """
     numbers = {info.key: info.number for info in infos}
-
-    def number(transition: Transition) -> int:
-        """Return the number of a transition."""
-        return numbers[f"{automaton.name} {transition.key}"]
-
-    def stage_of(written: Callable[[Transition], Mapping[str, Formula]]) -> Block:
-        """Return the stage of all regions with the assignments that `written` gives."""
-        return lower_stage_of_regions(automaton, fired_variable, number, written, known)
-
-    known = {**now, **equation_bindings(automaton, "equation.")}
-    before = stage_of(lambda transition: automaton.source_mode(transition).exit)
-    before = (*before, *stage_of(lambda transition: transition.reset))
-    moved = []
-    for region in automaton.all_regions:
-        transitions = [
-            transition for mode in region.modes.values() for transition in mode.transitions
-        ]
-        cases = tuple(
-            (number(transition), _enter_target(automaton, transition, infos))
-            for transition in transitions
-        )
-        moved.append(Switch(fired_variable(region.name), cases))
-    after = stage_of(lambda transition: automaton.target_mode(transition).entry)
-    return (
-        *before,
-        *moved,
-        *((evaluate_equations,) if _do_entries_read_equations(automaton) else ()),
-        *after,
-    )
-
-
-def _enter_target(
-    automaton: Automaton, transition: Transition, infos: tuple[TransitionInfo, ...]
-) -> Block:
-    """Return the operations of a transition that switch the mode and start a run."""
-    return (
-        *_switch_mode(automaton, transition, infos),
-        *start_run(automaton, automaton.target_mode(transition)),
-    )
-
-
-def _do_entries_read_equations(automaton: Automaton) -> bool:
-    """Return whether an entry action of any mode reads an equation."""
-    named = equation_bindings(automaton, "equation.")
-    entries = [formula for mode in automaton.all_modes for formula in mode.entry.values()]
-    return any(name in named for name in names_read(formula.tree for formula in entries))
-
-
-def _lower_exit_and_reset(
-    automaton: Automaton, mode: Mode, transition: Transition, known: Mapping[str, Expr]
-) -> list[Op]:
-    """Return the exit and then the reset of a transition, each as a stage (rule 6)."""
-    return [
-        *lower_stage(automaton, mode.exit, known),
-        *lower_stage(automaton, transition.reset, known),
+    selected = [
+        (each, (fired_variable(each.region), numbers[f"{automaton.name} {each.key}"]))
+        for each in automaton.all_transitions
     ]
+    moved = select_blocks(
+        (
+            selection,
+            (
+                *_switch_mode(automaton, each, infos),
+                *start_run(automaton, automaton.target_mode(each)),
+            ),
+        )
+        for each, selection in selected
+    )
+    read = bindings_of_targets(automaton, now, evaluate_equations)
+    return lower_transition(automaton, common_stages(automaton, selected), read, moved)
 
 
 def _switch_mode(
@@ -200,9 +144,8 @@ def _keeps_timers(automaton: Automaton, mode: Mode) -> bool:
 @cache_on_owner
 def _timer_keeping_targets(automaton: Automaton) -> frozenset[tuple[str, str]]:
     """Return the (region, mode) pairs that transitions with `memory: continue` enter."""
-    transitions = [transition for mode in automaton.all_modes for transition in mode.transitions]
     return frozenset(
         (transition.region, transition.target)
-        for transition in transitions
+        for transition in automaton.all_transitions
         if transition.memory == "continue"
     )

@@ -80,7 +80,7 @@ class SolverQuery:
     def names_read(self) -> set[str]:
         """Names that the conditions read, directly or through the assignments.
 
-        Variables, constants and assigned names are included, and `call <function>` for each call.
+        Variables, constants and assigned names are included.
         """
         result = {name for condition in self.conditions for name in expr_names(condition)}
         for target, value in reversed(self.assignments):

@@ -26,7 +26,7 @@ from language.ir.analysis_cache import cache_on_owner
 from language.ir.number_type import round_to_type
 from language.ir.ops import Binary, Compare, Expr, Ref, Select, Unary, Value, integer
 from language.ir.program import mode_variable
-from language.lowering.action_stages import storage_of
+from language.lowering.action_stages import Stage, storage_of, transition_stages
 from language.lowering.chart_activity import is_active, is_complete
 from language.lowering.constants import evaluate_exactly
 from language.lowering.delay_buffers import evaluate_ticks, expression_type
@@ -135,31 +135,28 @@ class GuardSnapshot:
         (rule 5). Guard, wait and events are not required here, and modes around source and target
         are not entered or left. Raises KeyError or SpecError like `lower_expression`.
         """
+        stages = transition_stages(self.automaton, transition)
+        values: dict[str, Expr] = {}
+        for stage in stages.before:
+            values = self._apply_stage(stage, values)
+        result = self._in_target(transition, values)
+        for stage in stages.after:
+            result = result._in_target(transition, result._apply_stage(stage, {}))
+        return result
+
+    def _in_target(self, transition: Transition, values: Mapping[str, Expr]) -> GuardSnapshot:
+        """Return the snapshot of the target mode, with some new values of variables."""
+        carried = {name: self.bindings[name] for name in self.automaton.state_variables}
         target = self.automaton.target_mode(transition)
-        carried = self._apply_stage(self.mode.exit, {})
-        carried = self._apply_stage(transition.reset, carried)
-        entered = GuardSnapshot(
-            self.automaton, target, self.path, {**self._carried_values(), **carried}
-        )
-        if target.entry:
-            assigned = entered._apply_stage(target.entry, {})
-            entered = GuardSnapshot(
-                self.automaton, target, self.path, {**entered._carried_values(), **assigned}
-            )
-        return entered
+        return GuardSnapshot(self.automaton, target, self.path, {**carried, **values})
 
-    def _carried_values(self) -> dict[str, Expr]:
-        """Return the symbolic values of states and discrete variables."""
-        return {name: self.bindings[name] for name in self.automaton.state_variables}
-
-    def _apply_stage(
-        self, formulas: Mapping[str, Formula], values: dict[str, Expr]
-    ) -> dict[str, Expr]:
+    def _apply_stage(self, stage: Stage, values: Mapping[str, Expr]) -> dict[str, Expr]:
         """Return `values` updated with the assignments of one stage.
 
         The formulas read `values` and the equations of this snapshot. Each assignment gets a new
         name in the path.
         """
+        formulas = {n: formula for action in stage for n, formula in action.assignments.items()}
         self._define_equations(formula.tree for formula in formulas.values())
         known = {**self.bindings, **values}
         result = dict(values)

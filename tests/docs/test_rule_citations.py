@@ -63,7 +63,7 @@ def _rules() -> tuple[Rule, ...]:
     return tuple(found)
 
 
-def _leaves() -> list[Rule]:
+def leaf_rules() -> list[Rule]:
     """Return the rules that have no parts, and the parts of the others."""
     divided = {rule.number for rule in _rules() if rule.part}
     return [rule for rule in _rules() if rule.part or rule.number not in divided]
@@ -113,7 +113,7 @@ def test_rules_are_numbered_without_holes(page: str) -> None:
         assert parts == "-abcdefghijkl"[: len(parts)], f"parts of rule {number}: {parts}"
 
 
-@pytest.mark.parametrize("rule", _leaves(), ids=lambda rule: rule.name)
+@pytest.mark.parametrize("rule", leaf_rules(), ids=lambda rule: rule.name)
 def test_a_rule_names_one_home_that_cites_it_and_a_test(rule: Rule) -> None:
     (home,) = rule.paths("Implemented in")
     assert rule.paths("Shown by"), "no test"
@@ -121,7 +121,7 @@ def test_a_rule_names_one_home_that_cites_it_and_a_test(rule: Rule) -> None:
     assert cited & {rule.name, rule.number}, f"{home} does not cite rule {rule.name}"
 
 
-@pytest.mark.parametrize("rule", _leaves(), ids=lambda rule: rule.name)
+@pytest.mark.parametrize("rule", leaf_rules(), ids=lambda rule: rule.name)
 def test_a_case_that_shows_a_rule_says_so(rule: Rule) -> None:
     for path in rule.paths("Shown by"):
         expected = ROOT / path / "expected.yaml"

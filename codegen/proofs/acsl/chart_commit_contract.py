@@ -92,7 +92,7 @@ class Commit:
                 is_taken = self._is_taken(region.region, words.number(transition))
                 for name, found in modes_after(words, transition, way).items():
                     for tests, number in outcomes(found):
-                        said = f"{words.now(words.mode(name))} == {number}"
+                        said = f"{words.now(name)} == {number}"
                         for source in self._sources(way) if tests else [""]:
                             yield f"{all_of(filter(None, [is_taken, source, *tests]))} ==> {said}"
 

@@ -8,26 +8,24 @@ takes. When a fault occurs, the region requests the fault mode, or nothing
 
 from __future__ import annotations
 
-from collections import ChainMap
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from codegen.proofs.acsl.chart_fault_contract import ChartFault, is_of_fault
 from codegen.proofs.acsl.chart_predicates import Configuration, all_of, any_of
 from language.charts.chart_context import IS_FIRST_STEP, IS_STEP_LIMIT_REACHED, request_variable
+from language.charts.transition_selection import choice_of_node
 from language.ir.ops import Expr
 from language.ir.program import TransitionInfo
-from language.lowering.chart_activity import is_complete
 from language.lowering.edge_detection import (
     EdgeDetector,
     edge_detectors_by_mode,
     edge_value_ref,
-    guard_memory_bindings,
 )
-from language.lowering.event_queue import CURRENT_EVENT
 from language.lowering.expressions import lower_expression
-from language.lowering.transition_metadata import wait_ticks
+from language.lowering.transition_choice import SampledChoice
 from language.model.automaton import Mode, Transition
+from language.model.region_queries import transitions_by_priority
 from language.model.statechart import ChartNode
 
 
@@ -78,7 +76,7 @@ class Choice:
         name = self.words.now(request_variable(region.region))
         chain = [n for n in charting.chart.region_ancestors(leaf) if charting.transitions_of(n)]
         ordered = chain if charting.chart.order == "inner_first" else chain[::-1]
-        ways = [(n, way) for n, way in self._ordered(ordered) if not is_of_fault(way)]
+        ways = [way for way in self._ordered(ordered) if not is_of_fault(way[-1])]
         usual = f"{name} == {self._first(ways, '0')}"
         if leaf in fault.outside:
             asked = self.words.is_one(
@@ -100,49 +98,25 @@ class Choice:
     def _fault(self) -> ChartFault:
         return ChartFault(self.words)
 
-    def _ordered(self, nodes: Iterable[ChartNode]) -> Iterator[tuple[ChartNode, Transition]]:
-        """Yield the transitions of some modes, each mode's by priority."""
+    def _ordered(self, nodes: Iterable[ChartNode]) -> Iterator[tuple[ChartNode, int, Transition]]:
+        """Yield the transitions of some modes with their index, each mode's by priority."""
         for node in nodes:
-            ways = enumerate(self.words.charting.transitions_of(node))
-            ordered = sorted(ways, key=lambda pair: (pair[1].priority or 0, pair[0]))
-            yield from ((node, transition) for _, transition in ordered)
+            mode = self.words.charting.mode_of(node)
+            ordered = transitions_by_priority(mode) if mode else []
+            yield from ((node, k, transition) for k, transition in ordered)
 
-    def _first(self, ways: Iterable[tuple[ChartNode, Transition]], none: str) -> str:
+    def _first(self, ways: Iterable[tuple[ChartNode, int, Transition]], none: str) -> str:
         """Return the number of the first transition that is enabled."""
-        found = none
-        for node, transition in reversed(list(ways)):
-            info = self.words.charting.info_of(transition)
-            test = self._due(info) if info.timer else self._enabled(node, transition)
-            number = self.words.place.integer_constant(request_variable(node.region), info.number)
-            found = f"(({test}) ? {number} : {found})"
+        found, words = none, self.words
+        for node, k, transition in reversed(list(ways)):
+            test = words.speech.predicate(self._choice(node).enabled[k], words.now)
+            number = words.number(transition)
+            told = words.place.integer_constant(request_variable(node.region), number)
+            found = f"(({test}) ? {told} : {found})"
         return found
 
-    def _due(self, info: TransitionInfo) -> str:
-        assert info.timer
-        ticks = self.words.speech.term(wait_ticks(info), self.words.now)
-        return f"{self.words.now(info.timer)} > {ticks}"
-
-    def _enabled(self, node: ChartNode, transition: Transition) -> str:
-        """Return that the event of a transition is present and its guard is true."""
-        words, chart = self.words, self.words.charting.chart
-        if transition.is_completion:
-            return words.speech.predicate(is_complete(chart, node, "memory.mode"), words.now)
-        said = words.speech.predicate(self._guard(node, transition), words.now)
-        if not transition.events:
-            return said
-        numbers = (chart.events[name].number for name in transition.events)
-        return all_of([words.is_one(CURRENT_EVENT.name, numbers, words.now), said])
-
-    def _guard(self, node: ChartNode, transition: Transition) -> Expr:
-        return lower_expression(transition.when.tree, self._known(node))
-
-    def _known(self, node: ChartNode) -> Mapping[str, Expr]:
-        charting = self.words.charting
-        return ChainMap(guard_memory_bindings(charting.automaton, self._mode(node)), self._names)
-
-    @property
-    def _names(self) -> dict[str, Expr]:
-        return dict(self.words.charting.bindings)
+    def _choice(self, node: ChartNode) -> SampledChoice:
+        return choice_of_node(self.words.charting, node, self._mode(node))
 
     def _mode(self, node: ChartNode) -> Mode:
         mode = self.words.charting.mode_of(node)
@@ -151,11 +125,11 @@ class Choice:
 
     def _counts(self, node: ChartNode, active: str) -> Iterator[str]:
         """Yield what the counters and edges of a mode are, if that is `active`; else the same."""
-        for transition in self.words.charting.transitions_of(node):
-            info = self.words.charting.info_of(transition)
+        words, conditions = self.words, self._choice(node).conditions
+        for k, info in enumerate(map(words.charting.info_of, self._mode(node).transitions)):
             if info.timer:
-                old, new = self.words.before(info.timer), self.words.now(info.timer)
-                value = self._count(info, self._enabled(node, transition), old)
+                old, new = words.before(info.timer), words.now(info.timer)
+                value = self._count(info, words.speech.predicate(conditions[k], words.now), old)
                 yield f"ensures {new} == {f'({active} ? {value} : {old})' if active else value};"
         automaton = self.words.charting.automaton
         for edge in edge_detectors_by_mode(automaton).get(self._mode(node).key, ()):
@@ -175,7 +149,7 @@ class Choice:
     def _edge(self, edge: EdgeDetector, node: ChartNode) -> str:
         """An edge is seen where its argument turned since the last look (rule 8)."""
         words = self.words
-        level = lower_expression(edge.call.arguments[0], self._names)
+        level = lower_expression(edge.call.arguments[0], words.charting.bindings)
         seen, old = words.now(f"work.edge_{edge.number}"), words.before(edge.armed_variable)
         if edge.is_change:
             last = edge_value_ref(words.charting.automaton, edge, f"memory.last_{edge.number}")

@@ -133,7 +133,7 @@ class Step:
         words, said = self.words, []
         for name, found in modes_after(words, transition, way).items():
             for tests, number in outcomes(found):
-                end = f"{words.now(words.mode(name))} == {number}"
+                end = f"{words.now(name)} == {number}"
                 said.append(f"({all_of(tests)} ==> {end})" if tests else end)
         return all_of(said)
 

@@ -35,6 +35,7 @@ from language.ir.ops import (
     Value,
 )
 from language.ir.program import Program, Variable
+from language.ir.rewrite_ops import map_operations
 from language.ircheck.check_program import InvalidProgram, check_program, require_valid
 from language.ircheck.violation import Rule
 from language.loading.load import automaton_of, lower_automaton, program_of
@@ -113,26 +114,14 @@ def change_first(
     """Return a Program with the first operation that matches replaced by others."""
     is_done = False
 
-    def visit(block: Block) -> Block:
+    def change(op: Op) -> Block:
         nonlocal is_done
-        ops: list[Op] = []
-        for op in block:
-            if not is_done and matches(op):
-                is_done = True
-                ops += replaced(op)
-                continue
-            match op:
-                case Branch(condition, then, other):
-                    ops.append(Branch(condition, visit(then), visit(other)))
-                case Switch(selector, cases):
-                    ops.append(Switch(selector, tuple((k, visit(b)) for k, b in cases)))
-                case Loop(count, index, body):
-                    ops.append(Loop(count, index, visit(body)))
-                case _:
-                    ops.append(op)
-        return tuple(ops)
+        if is_done or not matches(op):
+            return (op,)
+        is_done = True
+        return replaced(op)
 
-    blocks = {name: visit(block) for name, block in program.blocks.items()}
+    blocks = {name: map_operations(block, change) for name, block in program.blocks.items()}
     assert is_done, "nothing matches"
     return dataclasses.replace(program, blocks=blocks)
 

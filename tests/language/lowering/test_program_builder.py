@@ -25,7 +25,7 @@ from language.ir.ops import (
     real,
 )
 from language.ir.program import Program
-from language.ir.traversal import expr_names, names_used, walk_ops
+from language.ir.traversal import called_functions, expr_functions, expr_names, names_used, walk_ops
 from language.loading.load import program_of
 from language.lowering.program_builder import finalise_program
 from language.numerics.function_table import FUNCTIONS
@@ -125,17 +125,16 @@ def test_a_function_comes_with_those_that_it_calls() -> None:
     plain = re.sub(r", bend: .*}", "}", TEXT)
     assert program(plain).functions == ()
     made = program(TEXT)
-    called = {name for name in names_used(made.blocks.values()) if name.startswith("call ")}
-    assert "call sin" in called
-    inner = {n for f in made.functions for n in names_used([f.body]) if n.startswith("call ")}
-    wanted = {name.removeprefix("call ") for name in called | inner} & set(FUNCTIONS)
+    called = called_functions(made.blocks.values())
+    assert "sin" in called
+    wanted = (called | called_functions(f.body for f in made.functions)) & set(FUNCTIONS)
     assert {function.name for function in made.functions} == wanted
 
 
 @pytest.mark.parametrize("name", ["estimator", "driveline", "estimator_simple"])
 def test_a_shipped_program_has_every_name_that_it_uses_and_uses_every_name(name: str) -> None:
     made = program_of(load_shipped(name))
-    used = {name for name in names_used(made.blocks.values()) if not name.startswith("call ")}
+    used = names_used(made.blocks.values())
     used |= {wire.source for wire in made.outputs}
     known = {v.name for v in made.variables} | {c.name for c in made.constants}
     assert used <= known | {"memory.faults"}
@@ -169,10 +168,10 @@ def test_every_name_in_an_expression_is_found() -> None:
         "state.x",
         "work.list",
         "work.k",
-        "call sin",
         "state.y",
         "constant.c",
     ]
+    assert expr_functions(expr) == ["sin"]
     assert list(expr_names(Value(True))) == []
 
 

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 
 from language.ir.ops import Assign, Block, Branch, Compare, Expr, FaultBit, Op, Ref, add, integer
 from language.ir.program import Program, Variable
+from language.ir.rewrite_ops import map_operations
 from language.ir.traversal import walk_ops
-from tests.lockstep.random_specs.mutant import rewrite_block
 
 ENABLED = "probe.enabled"
 TWO, ORDER, SWITCH = "probe.two", "probe.order", "probe.switch"
@@ -19,12 +19,12 @@ TWO, ORDER, SWITCH = "probe.two", "probe.order", "probe.switch"
 
 def instrument_program(program: Program) -> Program:
     """Return the Program with its counters."""
-    blocks = {name: rewrite_block(block, _counted) for name, block in program.blocks.items()}
+    blocks = {name: map_operations(block, _counted) for name, block in program.blocks.items()}
     for name, block in blocks.items():
         if name.startswith("jump_"):
             blocks[name] = _jump(block)
         if name.startswith("switch_"):
-            blocks[name] = rewrite_block(block, _switched)
+            blocks[name] = map_operations(block, _switched)
     written = {name for block in blocks.values() for op in walk_ops(block) for name in _probe(op)}
     variables = tuple(Variable(name, "whole") for name in sorted(written))
     return dataclasses.replace(program, blocks=blocks, variables=(*program.variables, *variables))

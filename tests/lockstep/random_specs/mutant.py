@@ -9,8 +9,9 @@ from typing import Any, Literal
 
 import pytest
 
-from language.ir.ops import Block, Branch, Loop, Op, Switch
+from language.ir.ops import Block, Op
 from language.ir.program import Program
+from language.ir.rewrite_ops import map_operations
 
 Patch = Callable[[pytest.MonkeyPatch], None]
 Change = Callable[[Op], Block]
@@ -55,27 +56,10 @@ def rewrite_operations(change: Change) -> Callable[[Program], Program]:
     """Return what replaces each operation of a Program by some."""
 
     def rewrite(program: Program) -> Program:
-        blocks = {name: rewrite_block(block, change) for name, block in program.blocks.items()}
+        blocks = {name: map_operations(block, change) for name, block in program.blocks.items()}
         return dataclasses.replace(program, blocks=blocks)
 
     return rewrite
-
-
-def rewrite_block(block: Block, change: Change) -> Block:
-    """Return a block with each operation replaced, the inner ones first."""
-    return tuple(op for old in block for op in change(_inside(old, change)))
-
-
-def _inside(op: Op, change: Change) -> Op:
-    match op:
-        case Branch(condition, then, other):
-            return Branch(condition, rewrite_block(then, change), rewrite_block(other, change))
-        case Switch(selector, cases):
-            return Switch(selector, tuple((n, rewrite_block(b, change)) for n, b in cases))
-        case Loop(count, index, body):
-            return Loop(count, index, rewrite_block(body, change))
-        case _:
-            return op
 
 
 def drop_lines(text: str) -> Callable[[Callable[..., Iterator[str]]], Callable[..., Any]]:
