@@ -83,7 +83,9 @@ def guess_map(
             if name not in columns and len(columns) < MAX_COLUMNS:
                 columns[name] = _guess_column(name, file.read(name).unit, span)
     if not columns:
-        problems.error("empty", files[0].header_span, "the recording has no column of numbers")
+        reason = _first_fault(files[0], time)
+        label = "the recording has no column of numbers"
+        problems.error("empty", files[0].header_span, label, reason)
     problems.raise_if_errors()
     mapping = replace(empty, time=time, time_unit=unit, columns=columns)
     findings = [
@@ -268,6 +270,17 @@ def _is_number(file: RecordedFile, name: str) -> bool:
     is_finite = [math.isfinite(value) for value in values if value is not None]
     number, bad = is_finite.count(True), is_finite.count(False)
     return number > MIN_NUMBER_FRACTION * len(values) and bad <= number // 10
+
+
+def _first_fault(file: RecordedFile, time: str) -> str:
+    """Return why the first column cannot be read; empty if all can be read."""
+    for name in _distinct_names(file, time):
+        try:
+            if file.names.count(name) == 1:
+                file.read(name)
+        except SpecError as error:
+            return error.problems[0].label
+    return ""
 
 
 def _guess_column(name: str, written: str, span: Span) -> ColumnMapping:

@@ -8,6 +8,7 @@ are read by their form, whatever their suffix is.
 from __future__ import annotations
 
 import logging
+import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -107,12 +108,18 @@ def read_can_log(path: Path, source: Source, can: Any, mapping: RecordingMap) ->
     else:
         numbered = _read_text(path, source, can, mapping, assumed)
     frames: dict[FrameKey, list[CanFrame]] = {}
+    unstamped: list[int] = []
     for line, frame in numbered:
-        if not (frame.is_error_frame or frame.is_remote_frame):
+        if not math.isfinite(frame.timestamp):
+            unstamped.append(line)
+        elif not (frame.is_error_frame or frame.is_remote_frame):
             bus = _bus_name(frame.channel, suffix)
             key = FrameKey(bus, frame.arbitration_id, frame.is_extended_id)
             found = CanFrame(frame.timestamp, bytes(frame.data), line)
             frames.setdefault(key, []).append(found)
+    if unstamped:
+        reason = f"the time stamp of line {unstamped[0]} is not a finite number"
+        assumed.append(Assumption("frames", f"{len(unstamped)} left out", reason))
     if not frames:
         label = "the log has no data frame of a CAN bus"
         if numbered:

@@ -56,9 +56,13 @@ UNITS = {
 """Units of time in the name of a column [s]."""
 SAVVYCAN = ("timestamp", "extended", "bus")
 """Columns of a table whose whole time stamps are microseconds, if they fit: SavvyCAN writes it."""
+MAX_STAMP_LENGTH = 40
+"""Number of characters of a time stamp."""
+MAX_STAMP = 10**30
+"""Bound of the number of a time stamp in any unit."""
 MAX_RATE = 22000
 """Largest number of frames on a bus in a second: frames without data at 1 Mbit/s, 47 bits each."""
-DECIMAL = re.compile(r"[-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?")
+DECIMAL = re.compile(r"[-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d{1,3})?")
 """A time stamp that is a number."""
 
 
@@ -209,14 +213,19 @@ def _read_stamps(
 ) -> list[Fraction | None]:
     """Return the stamps [s] of the frames; None for a text that is no stamp."""
     texts = [text for _, text, _ in frames]
-    first = next((text for text in texts if DECIMAL.fullmatch(text)), "")
-    if not first:
+    numbers = [_parse_number(text) for text in texts]
+    if all(number is None for number in numbers):
         return _read_dates(table, texts, date_order)
-    numbers = [
-        Fraction(text.replace(",", ".")) if DECIMAL.fullmatch(text) else None for text in texts
-    ]
     factor = _time_unit(table, frames, numbers, time, unit)
     return [None if number is None else factor * number for number in numbers]
+
+
+def _parse_number(text: str) -> Fraction | None:
+    """Return a time stamp exactly; None for a text that is no number or none of a time."""
+    if len(text) > MAX_STAMP_LENGTH or not DECIMAL.fullmatch(text):
+        return None
+    number = Fraction(text.replace(",", "."))
+    return number if abs(number) < MAX_STAMP else None
 
 
 def _read_dates(table: FrameTable, texts: Sequence[str], date_order: str) -> list[Fraction | None]:

@@ -112,6 +112,23 @@ class TestBadItems:
         assert values_of(found) == TORQUES
         assert notes_of(found) == [f"lines: 1 left out (line 4 is no complete frame: `{line}`)"]
 
+    @pytest.mark.parametrize("digits", [310, 1000, 4000])
+    @pytest.mark.parametrize("name", ["a.log", "a.asc", "a.csv"])
+    def test_a_frame_without_a_finite_time_is_left_out_and_told(
+        self, tmp_path: Path, name: str, digits: int
+    ) -> None:
+        stamps = [f"{0.01 * k:.6f}" for k in range(3)] + ["9" * digits + ".0"]
+        form = {
+            "a.log": "({}) can0 100#08006400",
+            "a.asc": "   {} 1  100             Rx   d 4 08 00 64 00",
+            "a.csv": "{},0x100,08 00 64 00",
+        }[name]
+        head = {"a.log": "", "a.asc": ASC, "a.csv": "time,id,data\n"}[name]
+        text = head + "".join(form.format(stamp) + "\n" for stamp in stamps)
+        found = read(write(tmp_path, name, text), MAP)
+        assert values_of(found) == (2.0, 2.0, 2.0)
+        assert any("left out" in note for note in notes_of(found))
+
     def test_a_cut_line_of_asc_is_left_out_and_told(self, tmp_path: Path) -> None:
         line = "   {:.6f} 1  100             Rx   d 4 08 00 64 00"
         text = "\n".join(line.format(0.01 * k) for k in range(3))

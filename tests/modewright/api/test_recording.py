@@ -206,7 +206,7 @@ def test_a_column_that_is_not_there_is_told_with_the_nearest_name(
     assert run("odd.csv", "--spec", "small_driveline") == 1
     text = " ".join(capsys.readouterr().out.split())
     assert "there is no column `torque`, which map `bench` reads; did you mean `Torque`?" in text
-    assert "error: there are two columns `motor` (odd.csv)" in text
+    assert "error: there are two columns `motor`; rename one of them in the file (odd.csv)" in text
     assert "error: there is no column `wheel`" in text
 
 
