@@ -20,6 +20,8 @@ from typing import Any, NamedTuple
 from engine.recordings.frame_table import find_frame_table, read_frame_table
 from engine.recordings.frame_text import (
     HEAD_LINES,
+    MAX_EXTENDED,
+    MAX_STANDARD,
     FrameTextError,
     find_line_format,
     read_frame_lines,
@@ -34,7 +36,7 @@ TEXT_SUFFIXES = (".csv", ".txt")
 """Suffixes of text files that may contain frames, if the map names a database."""
 CANDUMP_LINE = re.compile(
     r"\s*\(\d+(?:\.\d+)?\)\s+\S+\s+(?P<id>[0-9A-F]{3}|[0-9A-F]{8})#"
-    r"(?:#[0-9A-F](?:[0-9A-F]{2})*|(?:[0-9A-F]{2})*|R[0-9A-F]?)(?:\s+[RT])?\s*",
+    r"(?:#[0-9A-F](?:[0-9A-F]{2}){0,64}|(?:[0-9A-F]{2}){0,8}|R[0-9A-F]?)(?:\s+[RT])?\s*",
     re.IGNORECASE | re.ASCII,
 )
 """Pattern of a frame that `candump -L` writes."""
@@ -46,6 +48,24 @@ ASC_STAMP = re.compile(r"(\s*)(\d+)([.,])(\d+)(?=\s)", re.ASCII)
 """Pattern of the time stamp at the start of an ASC line."""
 ASC_RELATIVE = re.compile(r"\s*base\s+(?:hex|dec)\s+timestamps\s+relative", re.IGNORECASE)
 """Pattern of the ASC header whose stamps are differences to the line before."""
+ASC_ABSOLUTE = re.compile(r"\s*base\s+(?:hex|dec)\s+timestamps\s+absolute", re.IGNORECASE)
+"""Pattern of the ASC header whose stamps count from the start of the log."""
+ASC_FRAME = re.compile(
+    r"\s*\d+\.\d+\s+\d+\s+(?P<id>[0-9A-F]+x?)\s+(?P<direction>\S+)\s+(?P<kind>\S+)\s*(?P<rest>.*)",
+    re.IGNORECASE | re.ASCII,
+)
+"""Pattern of an ASC line that looks like a frame of CAN (not of CAN FD)."""
+ASC_DIRECTIONS = ("rx", "tx", "txrq")
+"""Words for the direction of a frame in ASC, in lower case."""
+ASC_BYTES = {True: re.compile(r"[0-9A-F]{2}", re.I), False: re.compile(r"\d{1,3}", re.ASCII)}
+"""Pattern of a byte of data in ASC, by whether its numbers are hexadecimal."""
+ASC_EVENT = re.compile(
+    r"\s*(?://|(?:Begin|End)\s+Trigger|[\d.]+\s+(?:(?:CAN\s+)?\d+\s+)?"
+    r"(?:Start of measurement|Statistic:|log\s+(?:direct\s+)?(?:start|stop|trigger)|"
+    r"CAN\s+\d+\s+Status|Status:))",
+    re.IGNORECASE,
+)
+"""Pattern of a line of ASC that states what happened to the log or to a bus."""
 ASC_FD_EVENT = re.compile(r"\s*[\d.]+\s+CANFD\s+[A-Z]", re.IGNORECASE)
 """Pattern of an ASC line of CAN FD that is no frame, such as the start of the measurement."""
 TRC_FRAME = re.compile(
@@ -55,6 +75,8 @@ TRC_FRAME = re.compile(
 """Pattern of the start of a frame in a TRC log."""
 TRC_VERSIONS = "1.0, 1.1, 1.3, 2.0 and 2.1"
 """Versions of TRC that python-can reads."""
+CAN_BYTES = 8
+"""Largest number of bytes of data of a frame of CAN."""
 HEAD_BYTES = 8192
 """Number of bytes at the start of a file that show whether it contains frames."""
 MAX_SHOWN = 60
@@ -212,7 +234,9 @@ def _read_text(
     bad: list[_BadLine] = []
     suffix = path.suffix.lower()
     frames = _read_other_form(source, text, lines, mapping, bad, assumed)
-    if frames is None:
+    if frames is not None:
+        suffix = ""
+    else:
         suffix = suffix if suffix in LOG_SUFFIXES else ".log"
         frames = _read_known_form(suffix, text, lines, can, bad, assumed)
     bad.sort()
@@ -277,14 +301,20 @@ def _read_known_form(
         checked = _check_candump(lines, bad)
     elif suffix == ".asc":
         reader, is_header = can.ASCReader, _is_asc_header
-        checked = _check_asc(lines, assumed)
+        checked = _check_asc(lines, bad, assumed)
     else:
         reader, checked = can.TRCReader, lines
     header = [(number, line) for number, line in checked if is_header(line)]
     body = [(number, line) for number, line in checked if not is_header(line)]
     if suffix == ".asc":
         header = _complete_asc_header(header, assumed)
-    return list(_parse_lines(reader, header, body, bad))
+    skipped: list[tuple[int, str]] = []
+    frames = list(_parse_lines(reader, header, body, bad, skipped))
+    if frames and skipped:
+        number, line = skipped[0]
+        reason = f"they are no frames of a CAN bus; line {number}: `{_crop(line)}`"
+        assumed.append(Assumption("other lines", f"{len(skipped)} left out", reason))
+    return frames
 
 
 def _decode_text(data: bytes) -> str:
@@ -325,15 +355,17 @@ def _drop_cut_line(text: str, lines: list[tuple[int, str]], bad: list[_BadLine])
 
 
 def _check_asc(
-    lines: Sequence[tuple[int, str]], assumed: list[Assumption]
+    lines: Sequence[tuple[int, str]], bad: list[_BadLine], assumed: list[Assumption]
 ) -> list[tuple[int, str]]:
     """Return the lines of an ASC log with absolute stamps and decimal points; both are noted.
 
     Relative stamps are differences to the line before (also to lines that are no frames). Lines of
-    CAN FD that are no frames are left out, because python-can fails at them.
+    CAN FD that are no frames are left out, because python-can fails at them. Frames whose data are
+    not as long as stated are added to `bad`, because python-can reads them.
     """
     head = [line for _, line in lines if _is_asc_header(line)]
     is_relative = any(ASC_RELATIVE.match(line) for line in head)
+    is_hexadecimal = not any(re.match(r"\s*base\s+dec", line, re.IGNORECASE) for line in head)
     has_comma, now = False, Decimal(0)
     result = []
     for number, line in lines:
@@ -343,14 +375,54 @@ def _check_asc(
             now = now + stamp if is_relative else stamp
             has_comma = has_comma or match[3] == ","
             line = f"{match[1]}{now:f}{line[match.end() :]}"
-        if not ASC_FD_EVENT.match(line):
+        if not _is_whole_asc(line, is_hexadecimal):
+            bad.append(_BadLine(number, line, "is no complete frame"))
+        elif not ASC_FD_EVENT.match(line):
             result.append((number, line))
+    if not is_relative and not any(ASC_ABSOLUTE.match(line) for line in head):
+        reason = "the header does not state whether they are absolute or relative"
+        assumed.append(Assumption("time stamps", "absolute", reason))
     if is_relative:
         reason = "the header states relative time stamps"
         assumed.append(Assumption("time stamps", "added to those of the lines before", reason))
     if has_comma:
         assumed.append(Assumption("decimal sign", "comma", "the form of the time stamps"))
     return result
+
+
+def _is_whole_asc(line: str, is_hexadecimal: bool) -> bool:
+    """Return whether a line is a complete frame of CAN, or does not look like one."""
+    match = ASC_FRAME.match(line)
+    if match is None:
+        return True
+    direction, kind = match["direction"].lower(), match["kind"].lower()
+    if not direction.startswith(("rx", "tx")) and kind not in ("d", "r"):
+        return True
+    is_known = direction in ASC_DIRECTIONS and kind in ("d", "r")
+    if not is_known or _parse_identifier(match["id"], is_hexadecimal) is None:
+        return False
+    length, *words = match["rest"].split() or [""]
+    if kind == "r":
+        return True
+    if not re.fullmatch(r"[0-9A-Fa-f]", length):
+        return False
+    count, byte = min(int(length, 16), CAN_BYTES), ASC_BYTES[is_hexadecimal]
+    data, behind = words[:count], words[count : count + 1]
+    return (
+        len(data) == count
+        and all(byte.fullmatch(word) for word in data)
+        and not any(word[0].isdigit() or byte.fullmatch(word) for word in behind)
+    )
+
+
+def _parse_identifier(text: str, is_hexadecimal: bool) -> int | None:
+    """Return the identifier of a frame in ASC (`x` marks an extended one); None for a wrong one."""
+    is_extended = text.lower().endswith("x")
+    digits = text[:-1] if is_extended else text
+    if not is_hexadecimal and not digits.isdecimal():
+        return None
+    number = int(digits, 16 if is_hexadecimal else 10) if len(digits) <= 10 else MAX_EXTENDED + 1
+    return number if number <= (MAX_EXTENDED if is_extended else MAX_STANDARD) else None
 
 
 def _complete_asc_header(
@@ -404,11 +476,13 @@ def _parse_lines(
     header: Sequence[tuple[int, str]],
     body: Sequence[tuple[int, str]],
     bad: list[_BadLine],
+    skipped: list[tuple[int, str]],
 ) -> Iterator[tuple[int, Any]]:
     """Yield the frames of a text log with the numbers of their lines.
 
     The reader of python-can starts again, with the header, behind each line at which it fails;
-    these lines are added to `bad`, and so are frames of TRC that it skips.
+    these lines are added to `bad`, and so are frames of TRC that it skips. Other lines that it
+    skips are added to `skipped`, without events of the log (`ASC_EVENT`).
     """
     texts = {number: line for number, line in (*header, *body)}
     positions = {number: k for k, (number, _) in enumerate(body)}
@@ -427,14 +501,21 @@ def _parse_lines(
             read.add(failed)
             start = positions.get(failed, len(body)) + 1
     for number, line in body:
-        if number not in read and TRC_FRAME.match(line):
+        if number in read or not line.strip():
+            continue
+        if TRC_FRAME.match(line):
             bad.append(_BadLine(number, line, "is no complete frame"))
+        elif not ASC_EVENT.match(line):
+            skipped.append((number, line))
 
 
 def _no_log_error(
     source: Source, suffix: str, lines: Sequence[tuple[int, str]], bad: Sequence[_BadLine]
 ) -> SpecError:
-    """Return the error for a text log without frames, at its first line that is no frame."""
+    """Return the error for a text log without frames, at its first line that is no frame.
+
+    `suffix` is that of a form that python-can reads, else empty.
+    """
     data = [one for one in lines if one[1].strip() and not one[1].lstrip().startswith((";", "//"))]
     number, line = (bad[0].number, bad[0].text) if bad else (data or [(1, "")])[-1]
     label = "this is no log of CAN frames"
@@ -443,6 +524,7 @@ def _no_log_error(
         ".asc": "a line of a frame is `0.010000 1  100  Rx   d 8 0F 00 00 00 64 01 00 00`",
         ".trc": f"the versions {TRC_VERSIONS} of TRC are read; the file names its own in "
         "`;$FILEVERSION=`",
+        "": "a row or line has a time, an identifier, and as many bytes as it states",
     }[suffix]
     if suffix == ".log" and CANDUMP_SCREEN.match(line):
         label = "the frames have no time stamps: this is what `candump` writes to the screen"

@@ -48,6 +48,8 @@ PROTOCOL_IDENTIFIER = re.compile(r'(?P<head>\s*BA_\s+"VFrameFormat"\s+BO_\s+)(?P
 """The start of an attribute statement up to the identifier of its message."""
 SIGNAL_BITS = re.compile(r"\s*SG_\s[^:\"]*:\s*(?P<start>-?\d+)\s*\|\s*(?P<length>\d+)\s*@")
 """The start of a signal up to its first bit and its number of bits."""
+BYTE_ORDER = re.compile(r"\s*SG_\s[^:\"]*:[^@\"]*@\s*[01]\s*[+-]")
+"""The start of a signal up to its byte order and sign."""
 MAX_BITS = 8 * 4095
 """Number of bits that a signal ends before: those of the longest message of a transport protocol.
 
@@ -130,8 +132,7 @@ def read_dbc_text(data: bytes, name: str) -> DbcText:
                 why = "is a signal without a message"
                 text.left_out.append(explain_left_out(start, statement, why))
             text.lines[start:end] = [""] * (end - start)
-        elif keyword == "SG_" and _is_outside(statement):
-            why = f"has bits outside of a message of {MAX_BITS // 8} bytes"
+        elif keyword == "SG_" and (why := _explain_signal(statement)):
             text.left_out.append(explain_left_out(start, statement, why))
             text.lines[start:end] = [""] * (end - start)
         elif (keyword == "BO_" and not is_kept) or not _is_needed(statement, keyword):
@@ -214,13 +215,17 @@ def _is_needed(statement: str, keyword: str) -> bool:
     return bool(PROTOCOL.match(statement)) or bool(re.search(r"\sBO_\s+\d+\s+\w+\s*:", bare))
 
 
-def _is_outside(statement: str) -> bool:
-    """Return whether a signal has bits that no message has."""
+def _explain_signal(statement: str) -> str:
+    """Return why a signal has no meaning, as a clause; empty for others."""
     match = SIGNAL_BITS.match(statement)
     if match is None:
-        return False
+        return ""
     start, length = int(match["start"]), int(match["length"])
-    return start < 0 or start + length > MAX_BITS
+    if start < 0 or start + length > MAX_BITS:
+        return f"has bits outside of a message of {MAX_BITS // 8} bytes"
+    if BYTE_ORDER.match(statement) is None:
+        return "does not state the order of its bytes and its sign, as in `@1+`"
+    return ""
 
 
 def _note_identifier(statement: str, start: int, extended: dict[int, int], text: DbcText) -> bool:

@@ -98,6 +98,8 @@ def _open_mdf(asammdf: Any, data: bytes, source: Source) -> Any:
             return asammdf.MDF(io.BytesIO(data))
     except Exception as error:
         message = first_line(error)
+        if "BytesIO" in message:  # the name of an object of Python
+            message = "its blocks cannot be read"
     finally:
         gc.collect()  # destructors of broken objects run while their errors are suppressed
         sys.unraisablehook = hook

@@ -155,6 +155,14 @@ class TestSignalsWithoutAValue:
         (note,) = notes_of(found)
         assert "line 8 (`SG_ x :`) has bits outside of a message of 4095 bytes" in note
 
+    @pytest.mark.parametrize("place", ["0|8@11e3-", "0|8@2+", "0|8@1", "0|8@"])
+    def test_a_signal_without_its_byte_order_is_left_out(self, tmp_path: Path, place: str) -> None:
+        dbc = MOTOR + f' SG_ x : {place} (1,0) [0|0] "" ECU\n'
+        found = read(write(tmp_path, "a.log", motor_lines(), dbc), MAP)
+        assert values_of(found) == TORQUES
+        (note,) = notes_of(found)
+        assert "line 8 (`SG_ x :`) does not state the order of its bytes and its sign" in note
+
     @pytest.mark.parametrize("length", [8, 24, 31])
     def test_a_floating_point_signal_of_a_wrong_size_is_refused(
         self, tmp_path: Path, length: int
