@@ -17,7 +17,11 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from engine.recordings.frame_table import find_frame_table, read_frame_table
+from engine.recordings.frame_table import (
+    find_frame_table,
+    propose_time_unit,
+    read_frame_table,
+)
 from engine.recordings.frame_text import (
     HEAD_LINES,
     MAX_EXTENDED,
@@ -223,6 +227,16 @@ def holds_frames(path: Path) -> bool:
         return False
     is_candump = any(CANDUMP_LINE.fullmatch(line) for line in lines[:HEAD_LINES])
     return is_candump or bool(find_frame_table(lines) or find_line_format(lines))
+
+
+def propose_frame_time(path: Path) -> tuple[str, str, str] | None:
+    """Return the time column of a text with a table of frames, its unit and the reason.
+
+    The result is None for another file, and if the unit does not follow from the rate of frames.
+    """
+    if path.suffix.lower() not in (*TEXT_SUFFIXES, ".log"):
+        return None
+    return propose_time_unit(_decode_text(path.read_bytes()).splitlines())
 
 
 def _read_text(
