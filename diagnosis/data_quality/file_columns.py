@@ -93,9 +93,12 @@ def _read_column(file: RecordedFile, name: str) -> FileColumn | None:
 
 
 def _means(columns: Sequence[FileColumn]) -> Iterator[FileColumn]:
-    """Yield the mean of columns whose names differ in a side only and whose values agree."""
-    keyed = [(side_of(column.names[0]), column) for column in columns]
-    sided = sorted((key[0], k) for k, (key, _) in enumerate(keyed) if key[1])
+    """Yield the mean of columns whose names differ in a side only and whose values agree.
+
+    Columns of two messages, buses or groups are no sensors of one quantity.
+    """
+    keyed = [(column.names[0].rpartition(".")[0], *side_of(column.names[0])) for column in columns]
+    sided = sorted(((group, words), k) for k, (group, words, side) in enumerate(keyed) if side)
     for _, items in groupby(sided, key=lambda item: item[0]):
         group = [columns[k] for _, k in items]
         first = group[0]

@@ -155,7 +155,7 @@ class TestBadItems:
 
     @pytest.mark.parametrize(
         "line",
-        [ "V9 13 25 0 0 620 x 4", "PktEth: Tx 01020304", "junk"],
+        ["V9 13 25 0 0 620 x 4", "PktEth: Tx 01020304", "junk"],
     )
     def test_other_lines_of_asc_are_told(self, tmp_path: Path, line: str) -> None:
         rows = ["1  100             Rx   d 4 08 00 64 00"] * 3 + [line]

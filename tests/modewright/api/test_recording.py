@@ -287,3 +287,35 @@ def test_a_unit_that_is_not_understood_is_told_without_a_map(
     path.write_text(f"{head}\n{units}\n{rest}", "utf-8")
     run("unit.csv")
     assert "has the unit `furlong`, which is not understood" in capsys.readouterr().out
+
+
+def test_a_channel_with_words_among_its_numbers_is_left_out(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asammdf, np = pytest.importorskip("asammdf"), pytest.importorskip("numpy")
+    stamps = np.arange(300) * 0.01
+    words = {"val_0": 5, "text_0": "red", "default": None}
+    raw = np.where(np.arange(300) < 10, 5, 7).astype("u1")
+    signals = [
+        asammdf.Signal(80 * np.sin(stamps), stamps, "Nm", "torque"),
+        asammdf.Signal(raw, stamps, name="lamp", conversion=words),
+    ]
+    with asammdf.MDF(version="4.10") as mdf:
+        mdf.append(signals)
+        mdf.save(project / "lamp.mf4")
+    run("lamp.mf4")
+    text = " ".join(capsys.readouterr().out.split())
+    assert "`lamp` (lamp.mf4): has text, such as `red`: left out" in text.replace("'", "`")
+    assert "not a finite number" not in text
+
+
+def test_the_unit_of_time_of_a_table_of_frames_is_told(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [f"{1000 + 10 * k},0x100,{k % 200:02x} 00" for k in range(300)]
+    (project / "frames.csv").write_text("\n".join(["Time,ID,Data", *rows]) + "\n", "utf-8")
+    dbc = 'VERSION ""\nNS_ :\nBS_:\nBU_: E\nBO_ 256 M: 2 E\n SG_ u : 0|8@1+ (1,0) [0|0] "Nm" E\n'
+    (project / "car.dbc").write_text(dbc, "utf-8")
+    run("frames.csv", "--dbc", "car.dbc")
+    text = " ".join(capsys.readouterr().out.split())
+    assert "the time `Time` is taken in ms: 100 frames a second fit a bus" in text
