@@ -106,13 +106,13 @@ def write_project(folder: Path) -> Path:
     with contextlib.redirect_stdout(io.StringIO()):
         measured = asammdf.MDF(version="4.10")
         flags = np.array([k % 7 == 3 for k in range(len(VALUES))])
-        words = {"val_0": 0, "text_0": "off", "val_1": 1, "text_1": "on", "default": b"?"}
+        names = {"val_0": 0, "text_0": "off", "val_1": 1, "text_1": "on", "default": b"?"}
         bits = np.array([k % 2 for k in range(len(VALUES))], dtype=np.uint8)
         raw = np.round(np.array(VALUES) * 10).astype(np.int16)
         measured.append(
             [
                 asammdf.Signal(np.array(VALUES), stamps, "Nm", "u", invalidation_bits=flags),
-                asammdf.Signal(bits, stamps, name="key", conversion=words),
+                asammdf.Signal(bits, stamps, name="key", conversion=names),
                 asammdf.Signal(raw, stamps, "A", "i", conversion={"a": 0.1, "b": 0.0}),
             ]
         )
@@ -127,10 +127,10 @@ def write_project(folder: Path) -> Path:
     asc = [f"{0.01 * k:.6f} 1 100 Rx d 4 {bytes.fromhex(w).hex(' ')}" for k, w in enumerate(words)]
     head = ["date Mon Jan 1 10:00:00.000 am 2024", "base hex timestamps absolute"]
     (folder / "run.asc").write_text("\n".join([*head, *asc]) + "\n", "utf-8")
-    table = [f"{10000 * k},00000100,false,0,4,{word}" for k, word in enumerate(words)]
-    rows = [",".join([row[:-9], *re.findall("..", row[-8:])]) for row in table]
-    head = "Time Stamp,ID,Extended,Bus,LEN,D1,D2,D3,D4"
-    (folder / "frames.csv").write_text("\n".join([head, *rows]) + "\n", "utf-8")
+    starts = [f"{10000 * k},00000100,false,0,4,{word}" for k, word in enumerate(words)]
+    frame_rows = [",".join([row[:-9], *re.findall("..", row[-8:])]) for row in starts]
+    first = "Time Stamp,ID,Extended,Bus,LEN,D1,D2,D3,D4"
+    (folder / "frames.csv").write_text("\n".join([first, *frame_rows]) + "\n", "utf-8")
     trc = [f"{k + 1:6})   {10 * k:8}.0  Rx  0100  4  {bytes.fromhex(w).hex(' ')}" for k, w in
            enumerate(words)]  # fmt: skip
     (folder / "run.trc").write_text("\n".join([";$FILEVERSION=1.1", *trc]) + "\n", "utf-8")
