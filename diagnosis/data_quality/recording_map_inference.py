@@ -118,8 +118,9 @@ def open_without_map(
     try:
         file = open_recording(path, empty, problems)
     except SpecError as error:
-        found = propose_frame_time(strip_window_suffix(path))
-        if error.problems[0].kind != "time" or found is None:
+        is_time = error.problems[0].kind == "time"  # the file has been read then
+        found = propose_frame_time(strip_window_suffix(path)) if is_time else None
+        if found is None:
             raise
         time, unit = found[0], parse_unit(found[1])
         file = open_recording(path, replace(empty, time=time, time_unit=unit), problems)

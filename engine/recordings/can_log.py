@@ -12,11 +12,17 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from decimal import Decimal
 from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from engine.recordings.asc_text import (
+    ASC_EVENT,
+    BadLine,
+    check_asc,
+    complete_asc_header,
+    is_asc_header,
+)
 from engine.recordings.frame_table import (
     find_frame_table,
     propose_time_unit,
@@ -24,8 +30,6 @@ from engine.recordings.frame_table import (
 )
 from engine.recordings.frame_text import (
     HEAD_LINES,
-    MAX_EXTENDED,
-    MAX_STANDARD,
     FrameTextError,
     find_line_format,
     read_frame_lines,
@@ -48,30 +52,6 @@ CANDUMP_ERROR_FLAG = 0x20000000
 """Bit of the identifier of an error frame in a candump log."""
 CANDUMP_SCREEN = re.compile(r"\s*\w+\s+[0-9A-F]+\s+\[\d+\]", re.IGNORECASE)
 """Pattern of a line without time stamp that candump writes to the screen."""
-ASC_STAMP = re.compile(r"(\s*)(\d+)([.,])(\d+)(?=\s)", re.ASCII)
-"""Pattern of the time stamp at the start of an ASC line."""
-ASC_RELATIVE = re.compile(r"\s*base\s+(?:hex|dec)\s+timestamps\s+relative", re.IGNORECASE)
-"""Pattern of the ASC header whose stamps are differences to the line before."""
-ASC_ABSOLUTE = re.compile(r"\s*base\s+(?:hex|dec)\s+timestamps\s+absolute", re.IGNORECASE)
-"""Pattern of the ASC header whose stamps count from the start of the log."""
-ASC_FRAME = re.compile(
-    r"\s*\d+\.\d+\s+\d+\s+(?P<id>[0-9A-F]+x?)\s+(?P<direction>\S+)\s+(?P<kind>\S+)\s*(?P<rest>.*)",
-    re.IGNORECASE | re.ASCII,
-)
-"""Pattern of an ASC line that looks like a frame of CAN (not of CAN FD)."""
-ASC_DIRECTIONS = ("rx", "tx", "txrq")
-"""Words for the direction of a frame in ASC, in lower case."""
-ASC_BYTES = {True: re.compile(r"[0-9A-F]{2}", re.I), False: re.compile(r"\d{1,3}", re.ASCII)}
-"""Pattern of a byte of data in ASC, by whether its numbers are hexadecimal."""
-ASC_EVENT = re.compile(
-    r"\s*(?://|(?:Begin|End)\s+Trigger|[\d.]+\s+(?:(?:CAN\s+)?\d+\s+)?"
-    r"(?:Start of measurement|Statistic:|log\s+(?:direct\s+)?(?:start|stop|trigger)|"
-    r"CAN\s+\d+\s+Status|Status:))",
-    re.IGNORECASE,
-)
-"""Pattern of a line of ASC that states what happened to the log or to a bus."""
-ASC_FD_EVENT = re.compile(r"\s*[\d.]+\s+CANFD\s+[A-Z]", re.IGNORECASE)
-"""Pattern of an ASC line of CAN FD that is no frame, such as the start of the measurement."""
 TRC_FRAME = re.compile(
     r"\s*\d+\)?\s+[\d.]+\s+"
     r"(?:(?:\d+\s+)?(?:Rx|Tx|DT|FD|FB|FE|BI)\s|(?!FFFFFFFF)[0-9A-F]{4,8}\s+\d)"
@@ -79,8 +59,6 @@ TRC_FRAME = re.compile(
 """Pattern of the start of a frame in a TRC log."""
 TRC_VERSIONS = "1.0, 1.1, 1.3, 2.0 and 2.1"
 """Versions of TRC that python-can reads."""
-CAN_BYTES = 8
-"""Largest number of bytes of data of a frame of CAN."""
 HEAD_BYTES = 8192
 """Number of bytes at the start of a file that show whether it contains frames."""
 MAX_SHOWN = 60
@@ -109,14 +87,6 @@ class CanLog:
 
     frames: dict[FrameKey, list[CanFrame]]
     assumptions: tuple[Assumption, ...] = ()
-
-
-class _BadLine(NamedTuple):
-    """Line of a text log that is no complete frame, with the reason."""
-
-    number: int
-    text: str
-    reason: str
 
 
 def read_can_log(path: Path, source: Source, can: Any, mapping: RecordingMap) -> CanLog:
@@ -245,7 +215,7 @@ def _read_text(
     """Return the frames of a text log with the numbers of their lines. Raises SpecError."""
     text = _decode_text(path.read_bytes())
     lines = list(enumerate(text.splitlines(), start=1))
-    bad: list[_BadLine] = []
+    bad: list[BadLine] = []
     suffix = path.suffix.lower()
     frames = _read_other_form(source, text, lines, mapping, bad, assumed)
     if frames is not None:
@@ -268,7 +238,7 @@ def _read_other_form(
     text: str,
     lines: list[tuple[int, str]],
     mapping: RecordingMap,
-    bad: list[_BadLine],
+    bad: list[BadLine],
     assumed: list[Assumption],
 ) -> list[tuple[int, Any]] | None:
     """Return the frames of a log that python-can does not read; None for another log.
@@ -294,7 +264,7 @@ def _read_other_form(
     except FrameTextError as error:
         span = Span(source, error.line, 1)
         raise SpecError([Problem("time", span, str(error), error.help)]) from None
-    bad += [_BadLine(number, line, "is no complete frame") for number, line in cut]
+    bad += [BadLine(number, line, "is no complete frame") for number, line in cut]
     return frames
 
 
@@ -303,7 +273,7 @@ def _read_known_form(
     text: str,
     lines: list[tuple[int, str]],
     can: Any,
-    bad: list[_BadLine],
+    bad: list[BadLine],
     assumed: list[Assumption],
 ) -> list[tuple[int, Any]]:
     """Return the frames of a log of a form (`LOG_SUFFIXES`) that python-can reads."""
@@ -314,14 +284,14 @@ def _read_known_form(
         reader, is_header = can.CanutilsLogReader, lambda _: False
         checked = _check_candump(lines, bad)
     elif suffix == ".asc":
-        reader, is_header = can.ASCReader, _is_asc_header
-        checked = _check_asc(lines, bad, assumed)
+        reader, is_header = can.ASCReader, is_asc_header
+        checked = check_asc(lines, bad, assumed)
     else:
         reader, checked = can.TRCReader, lines
     header = [(number, line) for number, line in checked if is_header(line)]
     body = [(number, line) for number, line in checked if not is_header(line)]
     if suffix == ".asc":
-        header = _complete_asc_header(header, assumed)
+        header = complete_asc_header(header, assumed)
     skipped: list[tuple[int, str]] = []
     frames = list(_parse_lines(reader, header, body, bad, skipped))
     if frames and skipped:
@@ -341,7 +311,7 @@ def _decode_text(data: bytes) -> str:
         return data.decode("cp1252", "replace")
 
 
-def _check_candump(lines: Iterable[tuple[int, str]], bad: list[_BadLine]) -> list[tuple[int, str]]:
+def _check_candump(lines: Iterable[tuple[int, str]], bad: list[BadLine]) -> list[tuple[int, str]]:
     """Return the complete lines of a candump log without error frames; others are added to `bad`.
 
     python-can takes a half byte at the end of a cut line as a whole one, and the error frames of
@@ -354,110 +324,18 @@ def _check_candump(lines: Iterable[tuple[int, str]], bad: list[_BadLine]) -> lis
             if not int(match["id"], 16) & CANDUMP_ERROR_FLAG:
                 result.append((number, line))
         elif line.strip():
-            bad.append(_BadLine(number, line, "is no complete frame"))
+            bad.append(BadLine(number, line, "is no complete frame"))
     return result
 
 
-def _drop_cut_line(text: str, lines: list[tuple[int, str]], bad: list[_BadLine]) -> None:
+def _drop_cut_line(text: str, lines: list[tuple[int, str]], bad: list[BadLine]) -> None:
     """Move a last line that begins with a number and has no line break from `lines` to `bad`.
 
     Its last byte may be cut.
     """
     if lines and not text.endswith(("\n", "\r")) and lines[-1][1].lstrip()[:1].isdigit():
         number, line = lines.pop()
-        bad.append(_BadLine(number, line, "may be cut, because it has no line break"))
-
-
-def _check_asc(
-    lines: Sequence[tuple[int, str]], bad: list[_BadLine], assumed: list[Assumption]
-) -> list[tuple[int, str]]:
-    """Return the lines of an ASC log with absolute stamps and decimal points; both are noted.
-
-    Relative stamps are differences to the line before (also to lines that are no frames). Lines of
-    CAN FD that are no frames are left out, because python-can fails at them. Frames whose data are
-    not as long as stated are added to `bad`, because python-can reads them.
-    """
-    head = [line for _, line in lines if _is_asc_header(line)]
-    is_relative = any(ASC_RELATIVE.match(line) for line in head)
-    is_hexadecimal = not any(re.match(r"\s*base\s+dec", line, re.IGNORECASE) for line in head)
-    has_comma, now = False, Decimal(0)
-    result = []
-    for number, line in lines:
-        match = ASC_STAMP.match(line)
-        if match:
-            stamp = Decimal(f"{match[2]}.{match[4]}")
-            now = now + stamp if is_relative else stamp
-            has_comma = has_comma or match[3] == ","
-            line = f"{match[1]}{now:f}{line[match.end() :]}"
-        if not _is_whole_asc(line, is_hexadecimal):
-            bad.append(_BadLine(number, line, "is no complete frame"))
-        elif not ASC_FD_EVENT.match(line):
-            result.append((number, line))
-    if not is_relative and not any(ASC_ABSOLUTE.match(line) for line in head):
-        reason = "the header does not state whether they are absolute or relative"
-        assumed.append(Assumption("time stamps", "absolute", reason))
-    if is_relative:
-        reason = "the header states relative time stamps"
-        assumed.append(Assumption("time stamps", "added to those of the lines before", reason))
-    if has_comma:
-        assumed.append(Assumption("decimal sign", "comma", "the form of the time stamps"))
-    return result
-
-
-def _is_whole_asc(line: str, is_hexadecimal: bool) -> bool:
-    """Return whether a line is a complete frame of CAN, or does not look like one."""
-    match = ASC_FRAME.match(line)
-    if match is None:
-        return True
-    direction, kind = match["direction"].lower(), match["kind"].lower()
-    if not direction.startswith(("rx", "tx")) and kind not in ("d", "r"):
-        return True
-    is_known = direction in ASC_DIRECTIONS and kind in ("d", "r")
-    if not is_known or _parse_identifier(match["id"], is_hexadecimal) is None:
-        return False
-    length, *words = match["rest"].split() or [""]
-    if kind == "r":
-        return True
-    if not re.fullmatch(r"[0-9A-Fa-f]", length):
-        return False
-    count, byte = min(int(length, 16), CAN_BYTES), ASC_BYTES[is_hexadecimal]
-    data, behind = words[:count], words[count : count + 1]
-    return (
-        len(data) == count
-        and all(byte.fullmatch(word) for word in data)
-        and not any(word[0].isdigit() or byte.fullmatch(word) for word in behind)
-    )
-
-
-def _parse_identifier(text: str, is_hexadecimal: bool) -> int | None:
-    """Return the identifier of a frame in ASC (`x` marks an extended one); None for a wrong one."""
-    is_extended = text.lower().endswith("x")
-    digits = text[:-1] if is_extended else text
-    if not is_hexadecimal and not digits.isdecimal():
-        return None
-    number = int(digits, 16 if is_hexadecimal else 10) if len(digits) <= 10 else MAX_EXTENDED + 1
-    return number if number <= (MAX_EXTENDED if is_extended else MAX_STANDARD) else None
-
-
-def _complete_asc_header(
-    header: Sequence[tuple[int, str]], assumed: list[Assumption]
-) -> list[tuple[int, str]]:
-    """Return the header of an ASC log with its last line, which python-can expects.
-
-    Without that line it would skip the first frame. A header without the base is noted.
-    """
-    if not any(re.match(r"\s*base\s", line, re.IGNORECASE) for _, line in header):
-        reason = "the header does not state the base"
-        assumed.append(Assumption("numbers", "hexadecimal", reason))
-    parts = [one for one in header if "events" not in one[1].lower()]
-    return [*parts, (0, "internal events logged")]
-
-
-def _is_asc_header(line: str) -> bool:
-    """Return whether a line of an ASC log belongs to its header: it states date, base or events."""
-    return bool(
-        re.match(r"\s*(?:date\s|base\s+(?:hex|dec)|(?:no\s*)?internal\s+events)", line, re.I)
-    )
+        bad.append(BadLine(number, line, "may be cut, because it has no line break"))
 
 
 def _is_trc_header(line: str) -> bool:
@@ -489,7 +367,7 @@ def _parse_lines(
     reader: Callable[[Any], Any],
     header: Sequence[tuple[int, str]],
     body: Sequence[tuple[int, str]],
-    bad: list[_BadLine],
+    bad: list[BadLine],
     skipped: list[tuple[int, str]],
 ) -> Iterator[tuple[int, Any]]:
     """Yield the frames of a text log with the numbers of their lines.
@@ -511,20 +389,20 @@ def _parse_lines(
             start = len(body)
         except Exception:  # the library raises errors of any type for a broken line
             failed = feed.number
-            bad.append(_BadLine(failed, texts[failed], "is no complete frame"))
+            bad.append(BadLine(failed, texts[failed], "is no complete frame"))
             read.add(failed)
             start = positions.get(failed, len(body)) + 1
     for number, line in body:
         if number in read or not line.strip():
             continue
         if TRC_FRAME.match(line):
-            bad.append(_BadLine(number, line, "is no complete frame"))
+            bad.append(BadLine(number, line, "is no complete frame"))
         elif not ASC_EVENT.match(line):
             skipped.append((number, line))
 
 
 def _no_log_error(
-    source: Source, suffix: str, lines: Sequence[tuple[int, str]], bad: Sequence[_BadLine]
+    source: Source, suffix: str, lines: Sequence[tuple[int, str]], bad: Sequence[BadLine]
 ) -> SpecError:
     """Return the error for a text log without frames, at its first line that is no frame.
 

@@ -319,3 +319,32 @@ def test_the_unit_of_time_of_a_table_of_frames_is_told(
     run("frames.csv", "--dbc", "car.dbc")
     text = " ".join(capsys.readouterr().out.split())
     assert "the time `Time` is taken in ms: 100 frames a second fit a bus" in text
+
+
+@pytest.mark.parametrize("command", ["check", "map"])
+@pytest.mark.parametrize("kind", ["folder", "pipe", "device", "loop", "dangling", "empty"])
+def test_what_is_no_file_is_refused(project: Path, command: str, kind: str) -> None:
+    path = project / "odd.csv"
+    if kind == "folder":
+        path.mkdir()
+    elif kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "empty":
+        path.touch()
+    else:
+        path.symlink_to({"device": "/dev/zero", "loop": "odd.csv", "dangling": "no.csv"}[kind])
+    words = ["recording", command, "odd.csv"]
+    words += ["--spec", "small_driveline"] if command == "map" else []
+    code = run_with_exit_code(lambda: app(words, standalone_mode=False))
+    assert code == 1
+
+
+@pytest.mark.parametrize("name", ["a\nb.csv", "a\tb.csv", "a\x1b[31m.csv", "a\u202eb.csv"])
+def test_a_name_of_a_file_stays_on_its_line(
+    project: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    (project / name).write_bytes((project / "drive.csv").read_bytes()[:2000])
+    run(name)
+    text = capsys.readouterr().out
+    assert ascii(name)[1:-1].replace("\\n", "\\x0a").replace("\\t", "\\x09") in text
+    assert name not in text
