@@ -1,7 +1,6 @@
 """Column score: how well a column of a file fits a signal of an automaton, and in which unit.
 
-The score is a sum of weights for the unit, the name and the values. The weights are chosen so that
-a fitting unit counts more than a word in a name, and a name that is equal as much as a unit.
+The score is the sum of `WEIGHTS` of what the unit, the name and the values say.
 """
 
 from __future__ import annotations
@@ -35,8 +34,40 @@ from language.typecheck.types import TypeName
 EXCLUDED = -1e6
 """Score of a pair that cannot be."""
 
-UNIT_IGNORED = 1.0
-"""Subtraction from the score of a name whose last word would be a unit of several letters."""
+WEIGHTS = {
+    "words of the signal": 6.0,
+    "unit": 4.0,
+    "same name": 4.0,
+    "command": 2.0,
+    "words in the name": 2.0,
+    "place": 1.75,
+    "unit by a parameter": 1.5,
+    "quantity": 1.5,
+    "quantity by a parameter": 1.0,
+    "other word": 1.0,
+    "unit of a sensor": 0.5,
+    "no unit": 0.5,
+    "letter": 0.5,
+    "mean of sensors": 0.5,
+    "range": 0.5,
+    "first value": 0.5,
+    "quantity of a sensor": 0.25,
+    "place of another signal": 0.25,
+    "rarer sensor": -0.05,
+    "other letter": -0.5,
+    "no command": -0.5,
+    "unit not read": -1.0,
+    "other quantity": -1.5,
+    "other place": -1.5,
+    "constant": -1.5,
+    "other role": -2.0,
+    "out of range": -2.0,
+}
+"""What speaks for a column as a signal, and against it.
+
+Their order is the knowledge: a unit that fits counts as much as the name of the signal and more
+than any word in a name. Their sizes are set by hand; a person checks each proposed line.
+"""
 
 SAME_NAME = "it has the name of the signal"
 """Reason of a line whose column has the name of its signal."""
@@ -141,9 +172,10 @@ def _score_reading(
     score, reasons = _score_name(reading, meaning, proposed, context)
     proposed = replace(proposed, reasons=(*proposed.reasons, *reasons))
     if reading.unit is None:
-        score -= UNIT_IGNORED * any(len(r.stem) < len(reading.stem) - 2 for r in column.readings)
+        is_unit = any(len(r.stem) < len(reading.stem) - 2 for r in column.readings)
+        score += WEIGHTS["unit not read"] * is_unit
     value_score, value_reason = _score_values(column, proposed, signal)
-    mean = 0.5 if len(column.names) > 1 else 0.0
+    mean = WEIGHTS["mean of sensors"] if len(column.names) > 1 else 0.0
     return replace(
         proposed,
         score=proposed.score + score + value_score + mean,
@@ -157,7 +189,14 @@ def _score_words(column: FileColumn, signal: ModelSignal) -> ProposedColumn | No
     known |= {word.casefold() for word in signal.words}
     if not known or not {text.casefold() for text in column.texts} <= known:
         return None
-    return ProposedColumn(column, signal, "1", "", 6.0, ("its words are those of the signal",))
+    return ProposedColumn(
+        column,
+        signal,
+        "1",
+        "",
+        WEIGHTS["words of the signal"],
+        ("its words are those of the signal",),
+    )
 
 
 def _by_unit(
@@ -167,19 +206,20 @@ def _by_unit(
     where = "the file" if column.written else "its name"
     if are_compatible(unit.dimension, signal.dimension):
         reasons = (f"the unit in {where} fits",)
-        return ProposedColumn(column, signal, unit.text, "", 4.0, reasons)
+        return ProposedColumn(column, signal, unit.text, "", WEIGHTS["unit"], reasons)
     by_parameter = _scale_by_parameter(unit.dimension, signal.dimension, automaton)
     if by_parameter:
         scale, name = by_parameter
         reasons = (f"the unit in {where} fits with parameter `{name}`",)
-        return ProposedColumn(column, signal, unit.text, scale, 1.5, reasons)
+        score = WEIGHTS["unit by a parameter"]
+        return ProposedColumn(column, signal, unit.text, scale, score, reasons)
     own = quantities_of(unit.dimension) or ({"number"} if unit.dimension.is_number else set())
     wanted = quantities_of(signal.dimension)
     rank = next((k for k, q in enumerate(SENSED_BY) if q in own and SENSED_BY[q] & wanted), None)
     if rank is not None:
         scale = _unit_quotient(signal, unit)
         reasons = (f"the factor of the scale is unknown: `{unit.text}` is no unit of the signal",)
-        score = 0.5 - 0.05 * rank
+        score = WEIGHTS["unit of a sensor"] + rank * WEIGHTS["rarer sensor"]
         return ProposedColumn(column, signal, unit.text, scale, score, reasons, is_open=True)
     return None
 
@@ -200,7 +240,12 @@ def _without_unit(
         sensed = next((line for line in found if line is not None), None)
         reason = f"a {' or '.join(sorted(meaning.quantities))} by its name, without a unit"
         return (
-            replace(sensed, score=sensed.score - 0.25, reasons=(reason,), is_open=True)
+            replace(
+                sensed,
+                score=sensed.score - WEIGHTS["quantity of a sensor"],
+                reasons=(reason,),
+                is_open=True,
+            )
             if sensed
             else None
         )
@@ -213,10 +258,13 @@ def _without_unit(
                 if by_parameter:
                     scale, name = by_parameter
                     reason = f"a {quantity} by its name, with parameter `{name}`"
-                    return ProposedColumn(column, signal, text, scale, 1.0, (reason,), is_open=True)
+                    score = WEIGHTS["quantity by a parameter"]
+                    return ProposedColumn(
+                        column, signal, text, scale, score, (reason,), is_open=True
+                    )
     unit = _unit_in_range(column, signal)
     reasons = ("no unit in the file",)
-    return ProposedColumn(column, signal, unit, "", 0.5, reasons, is_open=True)
+    return ProposedColumn(column, signal, unit, "", WEIGHTS["no unit"], reasons, is_open=True)
 
 
 def _unit_in_range(column: FileColumn, signal: ModelSignal) -> str:
@@ -281,36 +329,36 @@ def _score_name(
     signal = proposed.signal
     own = signal.meaning
     if reading.stem.casefold() == signal.name.casefold():
-        return 4.0, [SAME_NAME]
+        return WEIGHTS["same name"], [SAME_NAME]
     wanted = quantities_of(signal.dimension)
     stated = quantities_of(parse_unit(proposed.unit).dimension) if proposed.scale else frozenset()
     if meaning.quantities & wanted:
-        score += 1.5
+        score += WEIGHTS["quantity"]
     elif meaning.quantities - stated and wanted:
-        score -= 1.5
+        score += WEIGHTS["other quantity"]
     elif meaning.letters and wanted:
-        score += 0.5 if meaning.letters & wanted else -0.5
+        score += WEIGHTS["letter" if meaning.letters & wanted else "other letter"]
     places = meaning.places & own.places
     if places:
-        score += 1.75 * len(places)
+        score += WEIGHTS["place"] * len(places)
         reasons.append(f"its name says {' and '.join(sorted(places))}")
     elif meaning.places and own.places:
-        score -= 1.5
+        score += WEIGHTS["other place"]
     elif meaning.places & context:
-        score += 0.25
+        score += WEIGHTS["place of another signal"]
     if ("command" in meaning.roles) != ("command" in own.roles):
-        score -= 2.0 if "command" in meaning.roles else 0.5
+        score += WEIGHTS["other role" if "command" in meaning.roles else "no command"]
     elif "command" in own.roles:
-        score += 2.0
+        score += WEIGHTS["command"]
         reasons.append("its name says command")
     if "monitor" in meaning.roles and "monitor" not in own.roles:
         score -= 2.5
     words = {word.casefold() for word in split_words(signal.name)}
     if len(words) > 1 and words <= {word.casefold() for word in split_words(reading.stem)}:
-        score += 2.0
+        score += WEIGHTS["words in the name"]
         reasons.append("it has the words of the signal")
     shared = meaning.others & own.others
-    score += len(shared)
+    score += WEIGHTS["other word"] * len(shared)
     if shared:
         reasons.append(f"its name says {' and '.join(sorted(shared))}")
     return score, reasons
@@ -323,7 +371,7 @@ def _score_values(
     known = column.values[np.isfinite(column.values)]
     score = 0.0
     if not np.ptp(known) and SAME_NAME not in proposed.reasons:
-        score -= 1.5
+        score += WEIGHTS["constant"]
     if proposed.scale:
         return score, ""
     unit = parse_unit(proposed.unit) if proposed.unit != "?" else None
@@ -333,11 +381,11 @@ def _score_values(
         return EXCLUDED, ""
     if signal.range is not None:
         if not _are_in_range(column.values, unit, signal.range):
-            return score - 2.0, ""
-        score += 0.5
+            return score + WEIGHTS["out of range"], ""
+        score += WEIGHTS["range"]
     if signal.first and len(known):
         first = float(unit.factor) * known[0] + float(unit.offset)
         span = float(unit.factor) * float(np.ptp(known))
         if abs(first - signal.first) <= RANGE_MARGIN * span:
-            return score + 0.5, "its first value is the initial value"
+            return score + WEIGHTS["first value"], "its first value is the initial value"
     return score, ""

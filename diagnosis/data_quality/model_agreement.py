@@ -50,7 +50,7 @@ class OutputAgreement:
     """The agreement of outputs: measured = gain * simulated(t - lag).
 
     The gain is that of fast or of slow motion, whichever is nearer to 1. `level` is the ratio of
-    root mean squares in the second half. `time_unit` is the reference time [s] of the signals.
+    root mean squares in the second half. `reference_time` is that of the signals [s].
     """
 
     recording: str
@@ -60,7 +60,7 @@ class OutputAgreement:
     correlation: float
     correlation_without_lag: float
     level: float = 1.0
-    time_unit: float = REFERENCE_TIME
+    reference_time: float = REFERENCE_TIME
 
     @property
     def is_clear(self) -> bool:
@@ -94,9 +94,9 @@ def compare_with_simulation(
         for piece in split_by_windows(recording):
             if remaining_time <= 0.0:
                 return agreements
-            unit = time_unit(piece)
-            part = _decimate_inputs(most_excited_piece(piece, piece_length * unit), unit)
-            remaining_time -= float((part.end - part.start) / unit)
+            time = recording_reference_time(piece)
+            part = _decimate_inputs(most_excited_piece(piece, piece_length * time), time)
+            remaining_time -= float((part.end - part.start) / time)
             for name, compared in reference.simulate(part).comparisons.items():
                 agreement = compare_signals(part.name, name, compared)
                 if agreement:
@@ -104,7 +104,7 @@ def compare_with_simulation(
     return agreements
 
 
-def time_unit(piece: Recording) -> Fraction:
+def recording_reference_time(piece: Recording) -> Fraction:
     """Return the reference time [s] of a recording; its period is that of the fastest output."""
     seconds = [one.seconds for one in piece.channels.values() if one.column.compare is not None]
     length = float(piece.end - piece.start)
@@ -137,9 +137,9 @@ def _places_with_samples(piece: Recording, length: Fraction, count: int) -> list
     return sorted(k for k in found if 0 <= k < count)
 
 
-def _decimate_inputs(piece: Recording, unit: Fraction) -> Recording:
+def _decimate_inputs(piece: Recording, time: Fraction) -> Recording:
     """Return a recording with every n-th sample of its inputs, at about the step of the grid."""
-    step = Fraction(GRID_STEP).limit_denominator(1000) * unit
+    step = Fraction(GRID_STEP).limit_denominator(1000) * time
     channels = dict(piece.channels)
     for name, channel in piece.channels.items():
         span = channel.times[-1] - channel.times[0]
@@ -192,9 +192,9 @@ def compare_signals(
     times = comparison.times
     if len(times) < 2 or not np.all(np.isfinite(comparison.simulated)):
         return None
-    unit = reference_time(float(np.median(np.diff(times))), float(times[-1] - times[0]))
-    start, end, step = times[0] + TRANSIENT_TIME * unit, times[-1], GRID_STEP * unit
-    if end - start < MIN_TIME * unit:
+    time = reference_time(float(np.median(np.diff(times))), float(times[-1] - times[0]))
+    start, end, step = times[0] + TRANSIENT_TIME * time, times[-1], GRID_STEP * time
+    if end - start < MIN_TIME * time:
         return None
     grid = np.arange(start, end, step)
     measured = _smoothed_rate(comparison.times, comparison.measured, grid, spread)
@@ -216,7 +216,7 @@ def compare_signals(
     late = times > 0.5 * (start + end)
     level = rms(comparison.measured[late]) / max(rms(comparison.simulated[late]), 1e-12)
     both = correlations[best], correlations[0]
-    return OutputAgreement(recording, name, gain, best * step, *both, level, unit)
+    return OutputAgreement(recording, name, gain, best * step, *both, level, time)
 
 
 def _low_frequency_rates(

@@ -62,7 +62,7 @@ PLACE_WORDS: Mapping[str, tuple[str, ...]] = {
     "motor": ("motor", "mot", "em", "engine", "eng", "machine", "drive", "mtr"),
     "wheel": ("wheel", "wheels", "whl", "wh", "w"),
     "brake": ("brake", "brk", "br"),
-    "vehicle": ("vehicle", "veh", "car", "abs"),
+    "vehicle": ("vehicle", "veh", "car"),
     "shaft": ("shaft", "hs", "halfshaft"),
     "link": ("link", "arm"),
     "load": ("load", "ld"),

@@ -16,7 +16,7 @@ from diagnosis.data_quality.model_agreement import (
     OutputAgreement,
     compare_with_simulation,
     most_excited_piece,
-    time_unit,
+    recording_reference_time,
 )
 from diagnosis.data_quality.output_comparison import ReferenceModel
 from diagnosis.data_quality.unit_sign_clock_errors import SHARED_FRACTION, UNIT_FACTORS
@@ -126,7 +126,7 @@ def find_corrections(
 def _shortest_piece(recording: Recording) -> Recording:
     """Return the most excited part of the first window, as short as can be compared."""
     piece = split_by_windows(recording)[0]
-    return most_excited_piece(piece, MIN_PIECE * time_unit(piece))
+    return most_excited_piece(piece, MIN_PIECE * recording_reference_time(piece))
 
 
 def find_millisecond_time(recording: Recording, reference: ReferenceModel) -> list[Finding]:

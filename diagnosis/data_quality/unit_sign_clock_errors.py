@@ -182,8 +182,8 @@ class _ClearAgreements:
         self.relations = by_channel
         self.gains = {name: median(r.gain for r in rs) for name, rs in by_channel.items()}
         self.lags = {name: median(r.significant_lag for r in rs) for name, rs in by_channel.items()}
-        units = [r.time_unit for rs in by_channel.values() for r in rs]
-        self.unit = median(units) if units else math.inf
+        times = [r.reference_time for rs in by_channel.values() for r in rs]
+        self.reference_time = median(times) if times else math.inf
         self.inputs = [
             channel.column.name
             for channel in recordings[0].channels.values()
@@ -262,9 +262,13 @@ class _ClearAgreements:
 
     def find_clock_errors(self) -> list[Finding]:
         """Return findings on outputs with a larger lag than actuators and sensors have."""
-        odd = {n: lag for n, lag in self.lags.items() if abs(lag) >= OFFSET_WARNING * self.unit}
+        odd = {
+            n: lag
+            for n, lag in self.lags.items()
+            if abs(lag) >= OFFSET_WARNING * self.reference_time
+        }
         spread = max(odd.values()) - min(odd.values()) if odd else math.inf
-        is_one = spread < CLOCK_TOLERANCE * self.unit
+        is_one = spread < CLOCK_TOLERANCE * self.reference_time
         groups = _groups(list(odd), is_one and len(odd) == len(self.lags))
         return [self._clock_offset_finding(group) for group in groups]
 
@@ -278,8 +282,10 @@ class _ClearAgreements:
             both = f"`{channels[0]}` and input `{self.inputs[0]}`"
             text = f"the clocks of {both} are {abs(lag):.2f} s apart"
         each = [r.significant_lag for name in channels for r in self.relations[name]]
-        near = sum(abs(one - lag) <= CLOCK_TOLERANCE * self.unit for one in each)
-        is_sure = near >= SHARED_FRACTION * len(each) and abs(lag) >= OFFSET_ERROR * self.unit
+        near = sum(abs(one - lag) <= CLOCK_TOLERANCE * self.reference_time for one in each)
+        is_sure = (
+            near >= SHARED_FRACTION * len(each) and abs(lag) >= OFFSET_ERROR * self.reference_time
+        )
         severity: Severity = "error" if is_sure else "warning"
         return Finding("clock_offset", self.name, channel, text, severity)
 
@@ -342,10 +348,10 @@ def _redundancy_findings(
     if sum(agreement.gain < 0.0 for agreement in agreements) > SHARED_FRACTION * len(agreements):
         return [Finding("sign", where, second, f"{both} with opposite signs", severity)]
     lag = median(agreement.significant_lag for agreement in agreements)
-    unit = median(agreement.time_unit for agreement in agreements)
-    near = CLOCK_TOLERANCE * unit
+    time = median(agreement.reference_time for agreement in agreements)
+    near = CLOCK_TOLERANCE * time
     same = sum(abs(agreement.significant_lag - lag) <= near for agreement in agreements)
-    is_offset = OFFSET_WARNING * unit <= abs(lag) <= MAX_SPEED_OFFSET * unit
+    is_offset = OFFSET_WARNING * time <= abs(lag) <= MAX_SPEED_OFFSET * time
     if is_offset and same > SHARED_FRACTION * len(agreements):
         late = second if lag > 0.0 else first
         text = f"{both}, but the clock of `{late}` is {abs(lag):.2f} s late"

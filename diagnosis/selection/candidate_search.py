@@ -60,8 +60,8 @@ class CandidateFit:
         if self.estimate is None:
             return 0
         own = effect_names(self.placed_effect)
-        count = sum(name in own for name in self.estimate.candidate.names)
-        return count - len(self.form.fixed)
+        names = self.estimate.candidate.names
+        return sum(name in own and name not in self.form.fixed for name in names)
 
     @property
     def cost(self) -> float:

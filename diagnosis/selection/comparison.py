@@ -31,7 +31,7 @@ from diagnosis.estimation.model_set import ModelSet
 from diagnosis.localisation.disturbance_state_fit import free_disturbance
 from diagnosis.localisation.ranking import disturbance_locations
 from diagnosis.model.parameter_vector import extend_vector
-from diagnosis.model.placed_effect import PlacedEffect, effect_names
+from diagnosis.model.placed_effect import PlacedEffect
 from diagnosis.selection.candidate_search import CandidateFit, search_candidates
 from diagnosis.selection.intersample import LogCallback
 from diagnosis.selection.nested_form import choose_form
@@ -185,18 +185,16 @@ def judge(
 def _judge_candidate(
     one: CandidateFit, base: Estimate, floor: Reals, correlation: float, recordings: int
 ) -> CandidateFit:
-    """Return a candidate with its gain and its share; one that was not fitted is unchanged.
-
-    The gain is that of the nested form with the largest one.
-    """
+    """Return a candidate with its gain, its share and its form; one without a fit is unchanged."""
     model = one.estimate
     if model is None:
         return one
-    price = parameter_price(model, correlation)
-    form = choose_form(model, effect_names(one.placed_effect), correlation, price)
-    saved = len(form.fixed) * price - form.added_cost / correlation
-    gain = effective_gain(model, base, correlation, recordings) + saved
-    return replace(one, gain=gain, share=explained_share(model, base, floor), form=form)
+    return replace(
+        one,
+        gain=effective_gain(model, base, correlation, recordings),
+        share=explained_share(model, base, floor),
+        form=choose_form(model, correlation, parameter_price(model, correlation)),
+    )
 
 
 def parameter_price(model: Estimate, correlation: float) -> float:
@@ -205,13 +203,21 @@ def parameter_price(model: Estimate, correlation: float) -> float:
 
 
 def effective_gain(model: Estimate, base: Estimate, correlation: float, recordings: int) -> float:
-    """Return the gain [nats] of a model over a base that it extends, less the price of parameters.
+    """Return the gain [nats] of a model over a base, less the price of its additional parameters.
 
-    `correlation` is the number of samples that count as one. Each additional parameter has its
-    price; one per recording has it for each recording.
+    `correlation` is the number of samples that count as one. A parameter per recording has its
+    price for each recording. Both models have the nested form of least cost.
     """
-    added = _parameter_count(model, recordings) - _parameter_count(base, recordings)
-    return (base.cost - model.cost) / correlation - added * parameter_price(model, correlation)
+    price = parameter_price(model, correlation)
+    before, after = (_cost_with_price(one, correlation, recordings, price) for one in (base, model))
+    return before - after
+
+
+def _cost_with_price(model: Estimate, correlation: float, recordings: int, price: float) -> float:
+    """Return the cost [nats] of the best form of a model, with the price of its parameters."""
+    form = choose_form(model, correlation, price)
+    count = _parameter_count(model, recordings) - len(form.fixed)
+    return (model.cost + form.added_cost) / correlation + count * price
 
 
 def _parameter_count(model: Estimate, recordings: int) -> int:

@@ -7,7 +7,7 @@ share one fit. The cost of a simpler form follows from the quadratic approximati
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,19 +32,17 @@ class NestedForm:
 GENERAL_FORM = NestedForm()
 
 
-def choose_form(
-    model: Estimate, names: Iterable[str], correlation: float, price: float
-) -> NestedForm:
+def choose_form(model: Estimate, correlation: float, price: float) -> NestedForm:
     """Return the form of a fitted model whose cost, with the price of its parameters, is least.
 
-    Parameters in `names` with a plain value are fixed there one after the other, as long as that
-    pays (backward elimination). Each saves `price` nats; the added cost counts for `correlation`
-    samples as one. A model without normal equations keeps its general form.
+    Parameters with a plain value are fixed there one after the other, as long as that pays
+    (backward elimination). Each saves `price` nats; the added cost counts for `correlation` samples
+    as one. A model without normal equations keeps its general form.
     """
-    if model.normal_equations is None:
+    if model.normal_equations is None or not _plain_distances(model):
         return GENERAL_FORM
     covariance, free = coordinate_covariance(model)
-    distances = _plain_distances(model, names)
+    distances = _plain_distances(model)
     rows = {name: row for row, name in enumerate(free) if name in distances}
 
     def form_of(fixed: tuple[str, ...]) -> NestedForm:
@@ -64,13 +62,12 @@ def choose_form(
     return best
 
 
-def _plain_distances(model: Estimate, names: Iterable[str]) -> dict[str, float]:
+def _plain_distances(model: Estimate) -> dict[str, float]:
     """Return the coordinate less that of the plain value, by name of the shared parameters."""
-    some = set(names)
     return {
         one.name: float(model.point.shared[k]) - one.coordinate(one.plain)
         for k, one in enumerate(model.candidate.free_parameters)
-        if one.name in some and one.plain is not None and not one.per_recording
+        if one.plain is not None and not one.per_recording
     }
 
 

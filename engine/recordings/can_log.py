@@ -31,6 +31,7 @@ from engine.recordings.frame_table import (
 from engine.recordings.frame_text import (
     HEAD_LINES,
     FrameTextError,
+    decode_text,
     find_line_format,
     read_frame_lines,
 )
@@ -192,7 +193,7 @@ def holds_frames(path: Path) -> bool:
         return False
     try:
         with path.open("rb") as file:
-            lines = _decode_text(file.read(HEAD_BYTES)).splitlines()
+            lines = decode_text(file.read(HEAD_BYTES)).splitlines()
     except OSError:
         return False
     is_candump = any(CANDUMP_LINE.fullmatch(line) for line in lines[:HEAD_LINES])
@@ -206,14 +207,14 @@ def propose_frame_time(path: Path) -> tuple[str, str, str] | None:
     """
     if path.suffix.lower() not in (*TEXT_SUFFIXES, ".log"):
         return None
-    return propose_time_unit(_decode_text(path.read_bytes()).splitlines())
+    return propose_time_unit(decode_text(path.read_bytes()).splitlines())
 
 
 def _read_text(
     path: Path, source: Source, can: Any, mapping: RecordingMap, assumed: list[Assumption]
 ) -> list[tuple[int, Any]]:
     """Return the frames of a text log with the numbers of their lines. Raises SpecError."""
-    text = _decode_text(path.read_bytes())
+    text = decode_text(path.read_bytes())
     lines = list(enumerate(text.splitlines(), start=1))
     bad: list[BadLine] = []
     suffix = path.suffix.lower()
@@ -299,16 +300,6 @@ def _read_known_form(
         reason = f"they are no frames of a CAN bus; line {number}: `{_crop(line)}`"
         assumed.append(Assumption("other lines", f"{len(skipped)} left out", reason))
     return frames
-
-
-def _decode_text(data: bytes) -> str:
-    """Return the text of a log in UTF-8, UTF-16 with its mark, or Windows-1252."""
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return data.decode("utf-16", "replace")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return data.decode("cp1252", "replace")
 
 
 def _check_candump(lines: Iterable[tuple[int, str]], bad: list[BadLine]) -> list[tuple[int, str]]:

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
+from engine.recordings.frame_text import MAX_EXTENDED, MAX_STANDARD, decode_text
 from engine.recordings.recording_file import Assumption
 
 STATEMENT = re.compile(r'[ \t]*([A-Z][A-Z_]*_|VERSION)(?=[\s:"]|$)')
@@ -59,8 +60,6 @@ EXTENDED_BIT = 1 << 31
 """Bit of an identifier in a DBC file that marks an extended one."""
 NO_FRAME = "VECTOR__INDEPENDENT_SIG_MSG"
 """Name of the message of signals that no frame contains."""
-MAX_STANDARD, MAX_EXTENDED = 0x7FF, 0x1FFFFFFF
-"""Largest identifiers of 11 and of 29 bits."""
 
 
 @dataclass
@@ -115,7 +114,7 @@ def read_dbc_text(data: bytes, name: str) -> DbcText:
 
     Raises ValueError if the file has no statement.
     """
-    text = DbcText(_remove_comments(_decode(data)).splitlines())
+    text = DbcText(_remove_comments(decode_text(data)).splitlines())
     bounds = list(find_statements(text.lines))
     if not bounds:
         raise ValueError("it has no statement of a DBC")
@@ -180,16 +179,6 @@ def explain_left_out(
 def _keyword(line: str) -> str:
     """Return the keyword of the first line of a statement."""
     return STATEMENT.match(line)[1]  # type: ignore[index]
-
-
-def _decode(data: bytes) -> str:
-    """Return the text of a DBC file in UTF-8, UTF-16 with its mark, or Windows-1252."""
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return data.decode("utf-16", "replace")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return data.decode("cp1252", "replace")
 
 
 def _remove_comments(text: str) -> str:

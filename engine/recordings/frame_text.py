@@ -230,6 +230,16 @@ def _parse_frame(form: LineFormat, match: re.Match[str], base: int) -> LoggedFra
     return LoggedFrame(stamp, bus_name(groups.get("bus") or ""), identifier, is_extended, data)
 
 
+def decode_text(data: bytes) -> str:
+    """Return the text of a log or of a DBC file in UTF-8, UTF-16 with its mark, or Windows-1252."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return data.decode("utf-16", "replace")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", "replace")
+
+
 def parse_bytes(text: str, base: int = 16) -> bytes:
     """Return the bytes of a text, separated by blanks or semicolons, or without separators.
 

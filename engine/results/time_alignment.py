@@ -99,7 +99,7 @@ def _correlate(
         total += np.where(scale > floor, products / np.maximum(scale, floor), 0.0)
     overlap = np.minimum(lags + n_b, n_a) - np.maximum(lags, 0)
     total[overlap < MIN_OVERLAP * min(n_a, n_b)] = -np.inf
-    return lags.astype(np.float64), total / len(names)
+    return lags, total / len(names)
 
 
 def _refine(

@@ -74,7 +74,11 @@ def _automata_of(spec: str, project: Project) -> list[Automaton]:
     if kind != "system":
         return []
     instances = read_system(document, project).instances.values()
-    return list({id(one.automaton): one.automaton for one in instances}.values())
+    found: list[Automaton] = []
+    for one in instances:
+        if one.automaton not in found:
+            found.append(one.automaton)
+    return found
 
 
 def _check_automaton(automaton: Automaton) -> IrCheck:

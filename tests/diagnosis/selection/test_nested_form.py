@@ -56,7 +56,7 @@ def test_the_added_cost_is_that_of_a_fit_with_fixed_parameters(
 ) -> None:
     half = np.array(root).reshape(3, 3)
     information, where = half @ half.T + np.eye(3), np.array(point)
-    form = choose_form(fitted(information, where, {"b": 0.0, "c": 1.0}), NAMES, 1.0, 2.0)
+    form = choose_form(fitted(information, where, {"b": 0.0, "c": 1.0}), 1.0, 2.0)
     values = {"b": 0.0, "c": 1.0}
     fixed = {NAMES.index(name): values[name] for name in form.fixed}
     assert form.added_cost == pytest.approx(cost_with_fixed(information, where, fixed), abs=1e-9)
@@ -69,8 +69,9 @@ def test_the_added_cost_is_that_of_a_fit_with_fixed_parameters(
 def test_a_parameter_that_differs_from_its_plain_value_is_kept() -> None:
     information = np.diag([100.0, 100.0, 100.0])
     model = fitted(information, np.array([1.0, 0.9, 0.01]), {"b": 0.0, "c": 0.0})
-    assert choose_form(model, NAMES, 1.0, 3.0).fixed == ("c",)
-    assert choose_form(model, NAMES, 50.0, 3.0).fixed == ("c", "b")
-    assert choose_form(model, ("a", "b"), 1.0, 3.0) == GENERAL_FORM
+    assert choose_form(model, 1.0, 3.0).fixed == ("c",)
+    assert choose_form(model, 50.0, 3.0).fixed == ("c", "b")
+    general = fitted(information, np.array([1.0, 0.9, 0.01]), {})
+    assert choose_form(general, 1.0, 3.0) == GENERAL_FORM
     unknown = dataclasses.replace(model, normal_equations=None)
-    assert choose_form(unknown, NAMES, 1.0, 3.0) == GENERAL_FORM
+    assert choose_form(unknown, 1.0, 3.0) == GENERAL_FORM
