@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from language.text.sanitise import escape_invisible
+
 
 def distinguish_file_names(paths: Sequence[Path]) -> Mapping[Path, str]:
     """Return the file name of each path, with as many parent folders as make names unique.
 
-    Names are absolute paths if two paths are the same.
+    Names are absolute paths if two paths are the same. They have one line (`escape_invisible`).
     """
     absolute = {path: path.absolute().parts for path in paths}
     names: dict[Path, str] = {}
     for count in range(1, max((len(parts) for parts in absolute.values()), default=0) + 1):
-        names = {path: "/".join(parts[-count:]) for path, parts in absolute.items()}
+        names = {
+            path: escape_invisible("/".join(parts[-count:])) for path, parts in absolute.items()
+        }
         if len(set(names.values())) == len(names):
             break
     return names

@@ -351,6 +351,8 @@ def _score_name(
     elif "command" in own.roles:
         score += WEIGHTS["command"]
         reasons.append("its name says command")
+    if "monitor" in meaning.roles and "monitor" not in own.roles:
+        score -= 2.5
     words = {word.casefold() for word in split_words(signal.name)}
     if len(words) > 1 and words <= {word.casefold() for word in split_words(reading.stem)}:
         score += WEIGHTS["words in the name"]

@@ -10,7 +10,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.data_quality.recording_map_inference import CHANNEL_TIME_NAME
+from diagnosis.data_quality.recording_map_inference import CHANNEL_TIME_NAME, distinct_names
 from diagnosis.data_quality.signal_words import UnitReading, read_unit_suffix, side_of
 from engine.recordings.mdf_reader import CAN_CHANNELS
 from engine.recordings.recording_file import RecordedFile
@@ -42,9 +42,12 @@ class FileColumn:
 
 
 def read_file_columns(file: RecordedFile, time: str) -> list[FileColumn]:
-    """Return the columns of numbers or words of a file, and the means of redundant ones."""
+    """Return the columns of numbers or words of a file, and the means of redundant ones.
+
+    A signal with several names has its shortest one.
+    """
     columns = []
-    names = [name for name in dict.fromkeys(file.names) if list(file.names).count(name) == 1]
+    names = [n for n in distinct_names(file, "") if list(file.names).count(n) == 1]
     clocks = {}
     for name in names:
         if name == time or (file.is_stamped and name.startswith(CAN_CHANNELS)):
@@ -90,9 +93,12 @@ def _read_column(file: RecordedFile, name: str) -> FileColumn | None:
 
 
 def _means(columns: Sequence[FileColumn]) -> Iterator[FileColumn]:
-    """Yield the mean of columns whose names differ in a side only and whose values agree."""
-    keyed = [(side_of(column.names[0]), column) for column in columns]
-    sided = sorted((key[0], k) for k, (key, _) in enumerate(keyed) if key[1])
+    """Yield the mean of columns whose names differ in a side only and whose values agree.
+
+    Columns of two messages, buses or groups are no sensors of one quantity.
+    """
+    keyed = [(column.names[0].rpartition(".")[0], *side_of(column.names[0])) for column in columns]
+    sided = sorted(((group, words), k) for k, (group, words, side) in enumerate(keyed) if side)
     for _, items in groupby(sided, key=lambda item: item[0]):
         group = [columns[k] for _, k in items]
         first = group[0]

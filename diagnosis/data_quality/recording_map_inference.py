@@ -20,9 +20,11 @@ from diagnosis.data_quality.clock_overlap import (
 )
 from diagnosis.data_quality.finding import Finding, Severity
 from diagnosis.data_quality.signal_words import read_unit_suffix
+from engine.recordings.can_log import propose_frame_time
 from engine.recordings.channel_reader import file_unit
 from engine.recordings.recording import open_recording
 from engine.recordings.recording_file import RecordedFile, Samples
+from engine.recordings.recording_window import strip_window_suffix
 from language.expressions.unit_spellings import unit_meanings
 from language.expressions.units import (
     NO_UNIT,
@@ -73,9 +75,10 @@ def guess_map(
     found = tuple(map(read_database_option, databases))
     empty = unmapped("guessed from the names", place, found)
     problems = Problems()
-    files = [open_recording(path, empty, problems) for path in paths]
+    opened = [open_without_map(path, empty, problems) for path in paths]
+    files = [file for file, *_ in opened]
     problems.raise_if_errors()
-    time, unit, reason = guess_time(files[0])
+    time, unit, reason = opened[0][1:]
     columns: dict[str, ColumnMapping] = {}
     for path, file in zip(paths, files, strict=True):
         span = Span(Source(display_path(path)), 1, 1)
@@ -83,7 +86,9 @@ def guess_map(
             if name not in columns and len(columns) < MAX_COLUMNS:
                 columns[name] = _guess_column(name, file.read(name).unit, span)
     if not columns:
-        problems.error("empty", files[0].header_span, "the recording has no column of numbers")
+        reason = _first_fault(files[0], time)
+        label = "the recording has no column of numbers"
+        problems.error("empty", files[0].header_span, label, reason)
     problems.raise_if_errors()
     mapping = replace(empty, time=time, time_unit=unit, columns=columns)
     findings = [
@@ -100,6 +105,28 @@ def guess_map(
 def unmapped(name: str, place: Span, databases: tuple[CanDatabase, ...] = ()) -> RecordingMap:
     """Return a map without columns, with which a file is opened before its columns are known."""
     return RecordingMap(name, "", parse_unit("s"), {}, {}, place, databases=databases)
+
+
+def open_without_map(
+    path: Path, empty: RecordingMap, problems: Problems
+) -> tuple[RecordedFile, str, Unit, str]:
+    """Return an opened file, its time column with the unit, and the reason if it is not stated.
+
+    `empty` is a map without columns (`unmapped`). The time column is empty if the file needs none.
+    Raises SpecError for a file that cannot be opened, and if no column looks like time.
+    """
+    try:
+        file = open_recording(path, empty, problems)
+    except SpecError as error:
+        is_time = error.problems[0].kind == "time"  # the file has been read then
+        found = propose_frame_time(strip_window_suffix(path)) if is_time else None
+        if found is None:
+            raise
+        time, unit = found[0], parse_unit(found[1])
+        file = open_recording(path, replace(empty, time=time, time_unit=unit), problems)
+        return file, time, unit, found[2]
+    problems.raise_if_errors()
+    return file, *guess_time(file)
 
 
 def guess_time(file: RecordedFile) -> tuple[str, Unit, str]:
@@ -134,7 +161,8 @@ def _left_out_findings(file: RecordedFile, mapping: RecordingMap, name: str) -> 
         return []
     found: list[Finding] = []
     candidates = list(_numeric_columns(file, mapping.time))
-    aliases = set(file.names) - set(_distinct_names(file, mapping.time)) - {mapping.time}
+    own = [n for n in distinct_names(file, mapping.time) if not CHANNEL_TIME_NAME.fullmatch(n)]
+    aliases = set(file.names) - set(own) - {mapping.time}
     for column in dict.fromkeys(file.names):
         text = ""
         severity: Severity = "note"
@@ -206,14 +234,15 @@ def _clock_findings(
 
 def _numeric_columns(file: RecordedFile, time: str) -> Iterator[str]:
     """Yield the unique columns of numbers of a file except those of time, in its order."""
-    names = _distinct_names(file, time)
+    names = distinct_names(file, time)
+    names = [n for n in names if not CHANNEL_TIME_NAME.fullmatch(n)]
     yield from (n for n in names if file.names.count(n) == 1 and _is_number(file, n))
 
 
-def _distinct_names(file: RecordedFile, time: str) -> list[str]:
+def distinct_names(file: RecordedFile, time: str) -> list[str]:
     """Return each name except those of time; the shortest name of a signal that is its own."""
     counts = Counter(file.names)
-    names = [n for n in counts if n != time and not CHANNEL_TIME_NAME.fullmatch(n)]
+    names = [n for n in counts if n != time]
     if file.is_stamped:
         parts = {name: name.split(".") for name in names}
         names = [
@@ -262,12 +291,26 @@ def _is_number(file: RecordedFile, name: str) -> bool:
     A column that cannot be read is none of numbers.
     """
     try:
-        values = file.read(name).values
+        samples = file.read(name)
     except SpecError:
         return False
+    values = samples.values
+    if samples.words and any(value is not None and math.isnan(value) for value in values):
+        return False  # words of the file
     is_finite = [math.isfinite(value) for value in values if value is not None]
     number, bad = is_finite.count(True), is_finite.count(False)
     return number > MIN_NUMBER_FRACTION * len(values) and bad <= number // 10
+
+
+def _first_fault(file: RecordedFile, time: str) -> str:
+    """Return why the first column cannot be read; empty if all can be read."""
+    for name in distinct_names(file, time):
+        try:
+            if file.names.count(name) == 1:
+                file.read(name)
+        except SpecError as error:
+            return error.problems[0].label
+    return ""
 
 
 def _guess_column(name: str, written: str, span: Span) -> ColumnMapping:

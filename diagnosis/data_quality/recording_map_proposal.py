@@ -20,6 +20,7 @@ from diagnosis.data_quality.column_score import (
     score_column,
 )
 from diagnosis.data_quality.file_columns import FileColumn, read_file_columns
+from diagnosis.data_quality.recording_map_inference import distinct_names
 from diagnosis.data_quality.signal_words import read_meaning
 from engine.recordings.recording_file import RecordedFile
 from language.expressions.syntax_tree import NumberLiteral
@@ -65,7 +66,7 @@ def propose_columns(file: RecordedFile, automaton: Automaton, time: str) -> MapP
     missing = [signal for signal in signals if signal.name not in found]
     return MapProposal(
         tuple(chosen),
-        tuple(name for name in dict.fromkeys(file.names) if name not in used | {time}),
+        tuple(name for name in distinct_names(file, time) if name not in used),
         tuple(s for s in missing if s.is_input),
         tuple(s for s in missing if not s.is_input),
     )

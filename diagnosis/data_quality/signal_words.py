@@ -77,6 +77,11 @@ ROLE_WORDS: Mapping[str, tuple[str, ...]] = {
         *("desired", "cmd", "command", "target", "tgt", "soll", "demand", "dem"),
     ),
     "measured": ("meas", "measured", "act", "actual", "ist", "fb", "feedback"),
+    "monitor": (
+        *("counter", "cnt", "alive", "aliv", "crc", "checksum", "chksum", "lsb", "msb", "mux"),
+        *("status", "stat", "qualifier", "qu", "flag", "valid", "error", "err", "fault"),
+        *("max", "maximum", "min", "minimum", "limit", "lim"),
+    ),
 }
 """Roles of signals, and the words in names that state them."""
 SIDE_WORDS = (
@@ -95,7 +100,8 @@ class NameMeaning:
     """What a name says: words of `quantities` and letters that may stand for them, and the rest.
 
     `quantities` are stated by a word, `letters` by the convention of a first letter. `places` are
-    parts of a machine, `roles` are `command` or `measured`, and `others` the words without a known
+    parts of a machine, `roles` are `command`, `measured` or `monitor` (a counter, a status or a
+    limit instead of the quantity), and `others` the words without a known
     meaning.
     """
 

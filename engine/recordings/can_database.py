@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import copy
 import logging
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -45,6 +46,8 @@ LIBRARY_FAULTS = (AttributeError, IndexError, KeyError, TypeError)
 """Errors of cantools whose text says nothing to a user."""
 CONVERT_HELP = "a DBC file of the same bus is read (the package canmatrix converts databases)"
 """What helps if a database of another format cannot be understood."""
+FLOAT_BITS = (16, 32, 64)
+"""Numbers of bits of a floating-point signal."""
 NO_MESSAGE = "contains no message"
 """Value of the assumption that a database has no message."""
 J1939_NULL_ADDRESS = 0xFE
@@ -71,13 +74,29 @@ class CanSignal:
     """A signal of a message; `selector` selects the frames that contain it (multiplexing).
 
     `is_unselectable` tells that the database gives the signal values of a multiplexer that its
-    message does not have.
+    message does not have. `fault` says why a signal cannot be decoded.
     """
 
     message: Any
     signal: Any
     selector: CanSignal | None = None
     is_unselectable: bool = False
+
+    @property
+    def fault(self) -> str:
+        """The reason why the signal or a selector of it has no value; empty if it has one."""
+        signal = self.signal
+        if self.is_unselectable:
+            text = "the DBC says that a multiplexer of message "
+            return text + f"`{self.message.name}` selects it, but the message has none"
+        if signal.start < 0 or signal.length < 1:
+            return f"the DBC gives it {signal.length} bits from bit {signal.start} on"
+        if signal.is_float and signal.length not in FLOAT_BITS:
+            text = f"the DBC calls it a floating-point number of {signal.length} bits; "
+            return text + f"there are {', '.join(map(str, FLOAT_BITS))}"
+        if self.selector is not None and self.selector.fault:
+            return f"its multiplexer `{self.selector.signal.name}`: {self.selector.fault}"
+        return ""
 
     @cached_property
     def length(self) -> int:
@@ -110,10 +129,15 @@ class CanSignal:
     def decode(self, data: bytes, is_raw: bool = False) -> float:
         """Return the value in the unit of the signal, or the raw value.
 
-        `data` has at least `length` bytes.
+        `data` has at least `length` bytes, and the signal no `fault`. A value that is too large for
+        a float is infinite.
         """
         values = self._codec.decode(data, decode_choices=False, scaling=not is_raw)
-        return float(values[self.signal.name])
+        value = values[self.signal.name]
+        try:
+            return float(value)
+        except OverflowError:  # an integer times an integer factor
+            return math.inf if value > 0 else -math.inf
 
     def is_selected(self, data: bytes) -> bool:
         """Return whether a frame contains the signal."""

@@ -8,15 +8,26 @@ are read by their form, whatever their suffix is.
 from __future__ import annotations
 
 import logging
+import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from decimal import Decimal
 from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from engine.recordings.frame_table import find_frame_table, read_frame_table
+from engine.recordings.asc_text import (
+    ASC_EVENT,
+    BadLine,
+    check_asc,
+    complete_asc_header,
+    is_asc_header,
+)
+from engine.recordings.frame_table import (
+    find_frame_table,
+    propose_time_unit,
+    read_frame_table,
+)
 from engine.recordings.frame_text import (
     HEAD_LINES,
     FrameTextError,
@@ -34,7 +45,7 @@ TEXT_SUFFIXES = (".csv", ".txt")
 """Suffixes of text files that may contain frames, if the map names a database."""
 CANDUMP_LINE = re.compile(
     r"\s*\(\d+(?:\.\d+)?\)\s+\S+\s+(?P<id>[0-9A-F]{3}|[0-9A-F]{8})#"
-    r"(?:#[0-9A-F](?:[0-9A-F]{2})*|(?:[0-9A-F]{2})*|R[0-9A-F]?)(?:\s+[RT])?\s*",
+    r"(?:#[0-9A-F](?:[0-9A-F]{2}){0,64}|(?:[0-9A-F]{2}){0,8}|R[0-9A-F]?)(?:\s+[RT])?\s*",
     re.IGNORECASE | re.ASCII,
 )
 """Pattern of a frame that `candump -L` writes."""
@@ -42,12 +53,6 @@ CANDUMP_ERROR_FLAG = 0x20000000
 """Bit of the identifier of an error frame in a candump log."""
 CANDUMP_SCREEN = re.compile(r"\s*\w+\s+[0-9A-F]+\s+\[\d+\]", re.IGNORECASE)
 """Pattern of a line without time stamp that candump writes to the screen."""
-ASC_STAMP = re.compile(r"(\s*)(\d+)([.,])(\d+)(?=\s)", re.ASCII)
-"""Pattern of the time stamp at the start of an ASC line."""
-ASC_RELATIVE = re.compile(r"\s*base\s+(?:hex|dec)\s+timestamps\s+relative", re.IGNORECASE)
-"""Pattern of the ASC header whose stamps are differences to the line before."""
-ASC_FD_EVENT = re.compile(r"\s*[\d.]+\s+CANFD\s+[A-Z]", re.IGNORECASE)
-"""Pattern of an ASC line of CAN FD that is no frame, such as the start of the measurement."""
 TRC_FRAME = re.compile(
     r"\s*\d+\)?\s+[\d.]+\s+"
     r"(?:(?:\d+\s+)?(?:Rx|Tx|DT|FD|FB|FE|BI)\s|(?!FFFFFFFF)[0-9A-F]{4,8}\s+\d)"
@@ -85,14 +90,6 @@ class CanLog:
     assumptions: tuple[Assumption, ...] = ()
 
 
-class _BadLine(NamedTuple):
-    """Line of a text log that is no complete frame, with the reason."""
-
-    number: int
-    text: str
-    reason: str
-
-
 def read_can_log(path: Path, source: Source, can: Any, mapping: RecordingMap) -> CanLog:
     """Return the data frames of a log; error and remote frames are left out.
 
@@ -108,12 +105,18 @@ def read_can_log(path: Path, source: Source, can: Any, mapping: RecordingMap) ->
     else:
         numbered = _read_text(path, source, can, mapping, assumed)
     frames: dict[FrameKey, list[CanFrame]] = {}
+    unstamped: list[int] = []
     for line, frame in numbered:
-        if not (frame.is_error_frame or frame.is_remote_frame):
+        if not math.isfinite(frame.timestamp):
+            unstamped.append(line)
+        elif not (frame.is_error_frame or frame.is_remote_frame):
             bus = _bus_name(frame.channel, suffix)
             key = FrameKey(bus, frame.arbitration_id, frame.is_extended_id)
             found = CanFrame(frame.timestamp, bytes(frame.data), line)
             frames.setdefault(key, []).append(found)
+    if unstamped:
+        reason = f"the time stamp of line {unstamped[0]} is not a finite number"
+        assumed.append(Assumption("frames", f"{len(unstamped)} left out", reason))
     if not frames:
         label = "the log has no data frame of a CAN bus"
         if numbered:
@@ -197,16 +200,28 @@ def holds_frames(path: Path) -> bool:
     return is_candump or bool(find_frame_table(lines) or find_line_format(lines))
 
 
+def propose_frame_time(path: Path) -> tuple[str, str, str] | None:
+    """Return the time column of a text with a table of frames, its unit and the reason.
+
+    The result is None for another file, and if the unit does not follow from the rate of frames.
+    """
+    if path.suffix.lower() not in (*TEXT_SUFFIXES, ".log"):
+        return None
+    return propose_time_unit(decode_text(path.read_bytes()).splitlines())
+
+
 def _read_text(
     path: Path, source: Source, can: Any, mapping: RecordingMap, assumed: list[Assumption]
 ) -> list[tuple[int, Any]]:
     """Return the frames of a text log with the numbers of their lines. Raises SpecError."""
     text = decode_text(path.read_bytes())
     lines = list(enumerate(text.splitlines(), start=1))
-    bad: list[_BadLine] = []
+    bad: list[BadLine] = []
     suffix = path.suffix.lower()
     frames = _read_other_form(source, text, lines, mapping, bad, assumed)
-    if frames is None:
+    if frames is not None:
+        suffix = ""
+    else:
         suffix = suffix if suffix in LOG_SUFFIXES else ".log"
         frames = _read_known_form(suffix, text, lines, can, bad, assumed)
     bad.sort()
@@ -224,7 +239,7 @@ def _read_other_form(
     text: str,
     lines: list[tuple[int, str]],
     mapping: RecordingMap,
-    bad: list[_BadLine],
+    bad: list[BadLine],
     assumed: list[Assumption],
 ) -> list[tuple[int, Any]] | None:
     """Return the frames of a log that python-can does not read; None for another log.
@@ -250,7 +265,7 @@ def _read_other_form(
     except FrameTextError as error:
         span = Span(source, error.line, 1)
         raise SpecError([Problem("time", span, str(error), error.help)]) from None
-    bad += [_BadLine(number, line, "is no complete frame") for number, line in cut]
+    bad += [BadLine(number, line, "is no complete frame") for number, line in cut]
     return frames
 
 
@@ -259,7 +274,7 @@ def _read_known_form(
     text: str,
     lines: list[tuple[int, str]],
     can: Any,
-    bad: list[_BadLine],
+    bad: list[BadLine],
     assumed: list[Assumption],
 ) -> list[tuple[int, Any]]:
     """Return the frames of a log of a form (`LOG_SUFFIXES`) that python-can reads."""
@@ -270,18 +285,24 @@ def _read_known_form(
         reader, is_header = can.CanutilsLogReader, lambda _: False
         checked = _check_candump(lines, bad)
     elif suffix == ".asc":
-        reader, is_header = can.ASCReader, _is_asc_header
-        checked = _check_asc(lines, assumed)
+        reader, is_header = can.ASCReader, is_asc_header
+        checked = check_asc(lines, bad, assumed)
     else:
         reader, checked = can.TRCReader, lines
     header = [(number, line) for number, line in checked if is_header(line)]
     body = [(number, line) for number, line in checked if not is_header(line)]
     if suffix == ".asc":
-        header = _complete_asc_header(header, assumed)
-    return list(_parse_lines(reader, header, body, bad))
+        header = complete_asc_header(header, assumed)
+    skipped: list[tuple[int, str]] = []
+    frames = list(_parse_lines(reader, header, body, bad, skipped))
+    if frames and skipped:
+        number, line = skipped[0]
+        reason = f"they are no frames of a CAN bus; line {number}: `{_crop(line)}`"
+        assumed.append(Assumption("other lines", f"{len(skipped)} left out", reason))
+    return frames
 
 
-def _check_candump(lines: Iterable[tuple[int, str]], bad: list[_BadLine]) -> list[tuple[int, str]]:
+def _check_candump(lines: Iterable[tuple[int, str]], bad: list[BadLine]) -> list[tuple[int, str]]:
     """Return the complete lines of a candump log without error frames; others are added to `bad`.
 
     python-can takes a half byte at the end of a cut line as a whole one, and the error frames of
@@ -294,68 +315,18 @@ def _check_candump(lines: Iterable[tuple[int, str]], bad: list[_BadLine]) -> lis
             if not int(match["id"], 16) & CANDUMP_ERROR_FLAG:
                 result.append((number, line))
         elif line.strip():
-            bad.append(_BadLine(number, line, "is no complete frame"))
+            bad.append(BadLine(number, line, "is no complete frame"))
     return result
 
 
-def _drop_cut_line(text: str, lines: list[tuple[int, str]], bad: list[_BadLine]) -> None:
+def _drop_cut_line(text: str, lines: list[tuple[int, str]], bad: list[BadLine]) -> None:
     """Move a last line that begins with a number and has no line break from `lines` to `bad`.
 
     Its last byte may be cut.
     """
     if lines and not text.endswith(("\n", "\r")) and lines[-1][1].lstrip()[:1].isdigit():
         number, line = lines.pop()
-        bad.append(_BadLine(number, line, "may be cut, because it has no line break"))
-
-
-def _check_asc(
-    lines: Sequence[tuple[int, str]], assumed: list[Assumption]
-) -> list[tuple[int, str]]:
-    """Return the lines of an ASC log with absolute stamps and decimal points; both are noted.
-
-    Relative stamps are differences to the line before (also to lines that are no frames). Lines of
-    CAN FD that are no frames are left out, because python-can fails at them.
-    """
-    head = [line for _, line in lines if _is_asc_header(line)]
-    is_relative = any(ASC_RELATIVE.match(line) for line in head)
-    has_comma, now = False, Decimal(0)
-    result = []
-    for number, line in lines:
-        match = ASC_STAMP.match(line)
-        if match:
-            stamp = Decimal(f"{match[2]}.{match[4]}")
-            now = now + stamp if is_relative else stamp
-            has_comma = has_comma or match[3] == ","
-            line = f"{match[1]}{now:f}{line[match.end() :]}"
-        if not ASC_FD_EVENT.match(line):
-            result.append((number, line))
-    if is_relative:
-        reason = "the header states relative time stamps"
-        assumed.append(Assumption("time stamps", "added to those of the lines before", reason))
-    if has_comma:
-        assumed.append(Assumption("decimal sign", "comma", "the form of the time stamps"))
-    return result
-
-
-def _complete_asc_header(
-    header: Sequence[tuple[int, str]], assumed: list[Assumption]
-) -> list[tuple[int, str]]:
-    """Return the header of an ASC log with its last line, which python-can expects.
-
-    Without that line it would skip the first frame. A header without the base is noted.
-    """
-    if not any(re.match(r"\s*base\s", line, re.IGNORECASE) for _, line in header):
-        reason = "the header does not state the base"
-        assumed.append(Assumption("numbers", "hexadecimal", reason))
-    parts = [one for one in header if "events" not in one[1].lower()]
-    return [*parts, (0, "internal events logged")]
-
-
-def _is_asc_header(line: str) -> bool:
-    """Return whether a line of an ASC log belongs to its header: it states date, base or events."""
-    return bool(
-        re.match(r"\s*(?:date\s|base\s+(?:hex|dec)|(?:no\s*)?internal\s+events)", line, re.I)
-    )
+        bad.append(BadLine(number, line, "may be cut, because it has no line break"))
 
 
 def _is_trc_header(line: str) -> bool:
@@ -387,12 +358,14 @@ def _parse_lines(
     reader: Callable[[Any], Any],
     header: Sequence[tuple[int, str]],
     body: Sequence[tuple[int, str]],
-    bad: list[_BadLine],
+    bad: list[BadLine],
+    skipped: list[tuple[int, str]],
 ) -> Iterator[tuple[int, Any]]:
     """Yield the frames of a text log with the numbers of their lines.
 
     The reader of python-can starts again, with the header, behind each line at which it fails;
-    these lines are added to `bad`, and so are frames of TRC that it skips.
+    these lines are added to `bad`, and so are frames of TRC that it skips. Other lines that it
+    skips are added to `skipped`, without events of the log (`ASC_EVENT`).
     """
     texts = {number: line for number, line in (*header, *body)}
     positions = {number: k for k, (number, _) in enumerate(body)}
@@ -407,18 +380,25 @@ def _parse_lines(
             start = len(body)
         except Exception:  # the library raises errors of any type for a broken line
             failed = feed.number
-            bad.append(_BadLine(failed, texts[failed], "is no complete frame"))
+            bad.append(BadLine(failed, texts[failed], "is no complete frame"))
             read.add(failed)
             start = positions.get(failed, len(body)) + 1
     for number, line in body:
-        if number not in read and TRC_FRAME.match(line):
-            bad.append(_BadLine(number, line, "is no complete frame"))
+        if number in read or not line.strip():
+            continue
+        if TRC_FRAME.match(line):
+            bad.append(BadLine(number, line, "is no complete frame"))
+        elif not ASC_EVENT.match(line):
+            skipped.append((number, line))
 
 
 def _no_log_error(
-    source: Source, suffix: str, lines: Sequence[tuple[int, str]], bad: Sequence[_BadLine]
+    source: Source, suffix: str, lines: Sequence[tuple[int, str]], bad: Sequence[BadLine]
 ) -> SpecError:
-    """Return the error for a text log without frames, at its first line that is no frame."""
+    """Return the error for a text log without frames, at its first line that is no frame.
+
+    `suffix` is that of a form that python-can reads, else empty.
+    """
     data = [one for one in lines if one[1].strip() and not one[1].lstrip().startswith((";", "//"))]
     number, line = (bad[0].number, bad[0].text) if bad else (data or [(1, "")])[-1]
     label = "this is no log of CAN frames"
@@ -427,6 +407,7 @@ def _no_log_error(
         ".asc": "a line of a frame is `0.010000 1  100  Rx   d 8 0F 00 00 00 64 01 00 00`",
         ".trc": f"the versions {TRC_VERSIONS} of TRC are read; the file names its own in "
         "`;$FILEVERSION=`",
+        "": "a row or line has a time, an identifier, and as many bytes as it states",
     }[suffix]
     if suffix == ".log" and CANDUMP_SCREEN.match(line):
         label = "the frames have no time stamps: this is what `candump` writes to the screen"

@@ -29,6 +29,8 @@ from language.model.system import RecordingMap
 from language.overlays.expand_document import display_path
 from language.text.diagnostic import MissingToolError, Problem, Source, Span, SpecError
 
+MULTIPLEXER_HELP = "a multiplexer has `M` behind its name in the DBC: ` SG_ Index M : 0|4@1+ ...`"
+"""What helps if a message has no multiplexer for its signals."""
 MAX_SHOWN = 3
 """Number of names or values that a message lists."""
 
@@ -218,12 +220,9 @@ class _DecodedLog:
         """
         (place,) = self.places[name]
         signal, frames = place.signal, self.log.frames[place.key]
-        if signal.is_unselectable:
-            label = (
-                f"signal `{signal.signal.name}` cannot be read: the DBC says that a multiplexer "
-            )
-            label += f"of message `{signal.message.name}` selects it, but the message has none"
-            hint = "a multiplexer has `M` behind its name in the DBC: ` SG_ Index M : 0|4@1+ ...`"
+        if signal.fault:
+            label = f"signal `{signal.signal.name}` cannot be read: {signal.fault}"
+            hint = MULTIPLEXER_HELP if signal.is_unselectable else ""
             raise SpecError([Problem("empty", Span(self.source, frames[0].line, 1), label, hint)])
         assumed = self._assumptions_of(place)
         whole = [frame for frame in frames if len(frame.data) >= signal.length]

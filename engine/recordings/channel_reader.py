@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from engine.recordings.recording_file import Assumption, RecordedFile, Samples
-from engine.recordings.text_dialect import DECIMAL
+from engine.recordings.text_dialect import COMMA_NUMBER, DECIMAL
 from engine.recordings.time_column import TimeColumnReader, report_unsorted
 from language.expressions.unit_spellings import UNIT_EQUIVALENTS, normalise_unit_text, unit_meanings
 from language.expressions.units import Unit, is_same_unit
@@ -26,6 +26,8 @@ from language.typecheck.types import MAX_INT, EnumType
 
 DISCRETE_TOLERANCE = 1e-6
 """Largest distance of a value from a whole number that stands for it; scales leave roundings."""
+MAX_NAMES = 6
+"""Number of names of columns that a message lists."""
 TRUTH_WORDS = {
     **dict.fromkeys(("true", "on", "yes"), 1.0),
     **dict.fromkeys(("false", "off", "no"), 0.0),
@@ -46,15 +48,24 @@ def require_names(
         if not count:
             label = f"there is no {file.noun} `{name}`, which map `{mapping.name}` reads"
             hint = file.explain_missing(name) or suggest_name(name, file.names)
+            hint = hint or _list_names(file)
             problems.error("column", file.header_span, label, hint)
         elif count > 1:
             label = f"there are {'two' if count == 2 else count} {file.noun}s `{name}`"
-            problems.error("column", file.header_span, label, file.explain_ambiguous(name))
+            hint = file.explain_ambiguous(name) or "rename one of them in the file"
+            problems.error("column", file.header_span, label, hint)
     if not file.rows:
         label = "the recording has a head line and no values"
         if file.is_stamped:
             label = "the recording has no values"
         problems.error("empty", file.header_span, label)
+
+
+def _list_names(file: RecordedFile) -> str:
+    """Return the first names of a file (`MAX_NAMES`) as a hint; empty if it has none."""
+    names = [f"`{name}`" for name in dict.fromkeys(file.names) if name]
+    rest = f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else ""
+    return f"the file has {', '.join(names[:MAX_NAMES])}{rest}" if names else ""
 
 
 class ChannelReader:
@@ -95,7 +106,7 @@ class ChannelReader:
             self.problems.error("time", column.span, label, hint)
         for k, (before, after) in enumerate(itertools.pairwise(stamps), start=1):
             if after <= before and not self.time_reader.has_max_problems:
-                report_unsorted(repr(float(after)), before, parts[0].place(k), self.problems)
+                report_unsorted(repr(float(after)), after, before, parts[0].place(k), self.problems)
         return stamps
 
     def samples(self, column: ColumnMapping) -> tuple[tuple[Fraction, ...], tuple[float, ...]]:
@@ -216,6 +227,14 @@ class ChannelReader:
             help = "a number has no signs of thousands"
         elif DECIMAL.fullmatch(text) and "." in text:
             help = "the decimal sign of this file is the comma"
+        elif COMMA_NUMBER.fullmatch(text):
+            help = "the decimal sign of this file is the point"
+        elif re.fullmatch(r"0[xX][0-9a-fA-F]+", text):
+            help = "hexadecimal numbers are not read"
+        elif text.casefold() in TRUTH_WORDS:
+            help = "the signal is a number; words are for signals of `type: bool`"
+        elif text.casefold().lstrip("+-") in ("inf", "infinity"):
+            help = "leave the cell blank, with `blank: skip` in the map"
         return f"`{text}` in {self.file.noun} `{name}` is not a finite number", help
 
     def _to_discrete(self, column: ColumnMapping, value: float, place: Span) -> float:

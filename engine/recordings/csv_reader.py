@@ -251,8 +251,7 @@ class _CsvRows:
                 label = f"this row has {len(row)} cells, the head line has {width}"
                 name = SEPARATOR_NAMES[self.separator]
                 hint = f"the cells of this file are divided by the {name}"
-                if self.separator == ",":
-                    hint = "a recording is separated by commas, with decimal points"
+                hint += "; `csv: {head: N, separator: ...}` in the map states the form"
                 problems.error("row", Span(self.source, number, 1, len(line)), label, hint)
             else:
                 self.numbers.append(number)
@@ -270,7 +269,12 @@ class _CsvRows:
         try:
             return next(csv.reader([line], delimiter=self.separator, strict=True))
         except csv.Error as error:
-            problems.error("row", Span(self.source, number, 1, len(line)), f"not CSV: {error}")
+            label = f"not CSV: {error}"
+            hint = ""
+            if str(error) == "unexpected end of data":
+                label = "a quotation mark of this line has no partner"
+                hint = "a cell with line breaks is not read"
+            problems.error("row", Span(self.source, number, 1, len(line)), label, hint)
             return [""] * len(self.head)
 
     @cached_property

@@ -47,6 +47,15 @@ IDENTIFIER = re.compile(r"(?P<head>\s*(?:BO_|VAL_|SIG_VALTYPE_|SG_MUL_VAL_)\s+)(
 """The start of a statement up to the identifier of its message."""
 PROTOCOL_IDENTIFIER = re.compile(r'(?P<head>\s*BA_\s+"VFrameFormat"\s+BO_\s+)(?P<number>\d+)\b')
 """The start of an attribute statement up to the identifier of its message."""
+SIGNAL_BITS = re.compile(r"\s*SG_\s[^:\"]*:\s*(?P<start>-?\d+)\s*\|\s*(?P<length>\d+)\s*@")
+"""The start of a signal up to its first bit and its number of bits."""
+BYTE_ORDER = re.compile(r"\s*SG_\s[^:\"]*:[^@\"]*@\s*[01]\s*[+-]")
+"""The start of a signal up to its byte order and sign."""
+MAX_BITS = 8 * 4095
+"""Number of bits that a signal ends before: those of the longest message of a transport protocol.
+
+cantools needs a time in proportion to it.
+"""
 EXTENDED_BIT = 1 << 31
 """Bit of an identifier in a DBC file that marks an extended one."""
 NO_FRAME = "VECTOR__INDEPENDENT_SIG_MSG"
@@ -122,6 +131,9 @@ def read_dbc_text(data: bytes, name: str) -> DbcText:
                 why = "is a signal without a message"
                 text.left_out.append(explain_left_out(start, statement, why))
             text.lines[start:end] = [""] * (end - start)
+        elif keyword == "SG_" and (why := _explain_signal(statement)):
+            text.left_out.append(explain_left_out(start, statement, why))
+            text.lines[start:end] = [""] * (end - start)
         elif (keyword == "BO_" and not is_kept) or not _is_needed(statement, keyword):
             _note_long_name(statement, text)
             text.lines[start:end] = [""] * (end - start)
@@ -190,6 +202,19 @@ def _is_needed(statement: str, keyword: str) -> bool:
     if keyword in DECODING:
         return bare.strip() != keyword
     return bool(PROTOCOL.match(statement)) or bool(re.search(r"\sBO_\s+\d+\s+\w+\s*:", bare))
+
+
+def _explain_signal(statement: str) -> str:
+    """Return why a signal has no meaning, as a clause; empty for others."""
+    match = SIGNAL_BITS.match(statement)
+    if match is None:
+        return ""
+    start, length = int(match["start"]), int(match["length"])
+    if start < 0 or start + length > MAX_BITS:
+        return f"has bits outside of a message of {MAX_BITS // 8} bytes"
+    if BYTE_ORDER.match(statement) is None:
+        return "does not state the order of its bytes and its sign, as in `@1+`"
+    return ""
 
 
 def _note_identifier(statement: str, start: int, extended: dict[int, int], text: DbcText) -> bool:

@@ -56,9 +56,17 @@ UNITS = {
 """Units of time in the name of a column [s]."""
 SAVVYCAN = ("timestamp", "extended", "bus")
 """Columns of a table whose whole time stamps are microseconds, if they fit: SavvyCAN writes it."""
+MAX_STAMP_LENGTH = 40
+"""Number of characters of a time stamp."""
+MAX_STAMP = 10**30
+"""Bound of the number of a time stamp in any unit."""
 MAX_RATE = 22000
 """Largest number of frames on a bus in a second: frames without data at 1 Mbit/s, 47 bits each."""
-DECIMAL = re.compile(r"[-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?")
+MIN_RATE = 20
+"""Smallest number of frames in a second that a log of a vehicle or of a test rig has."""
+PROPOSED_UNITS = ("s", "ms", "us", "ns")
+"""Units of time that are proposed."""
+DECIMAL = re.compile(r"[-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d{1,3})?")
 """A time stamp that is a number."""
 
 
@@ -88,6 +96,32 @@ def find_frame_table(lines: Sequence[str]) -> FrameTable | None:
             if table is not None:
                 return table
     return None
+
+
+def propose_time_unit(lines: Sequence[str]) -> tuple[str, str, str] | None:
+    """Return the time column of a table of frames, its unit and the reason; None if there is none.
+
+    It is the only unit in which the rows are neither more than the buses carry nor fewer than
+    `MIN_RATE` a second.
+    """
+    table = find_frame_table(lines)
+    if table is None or table.unit:
+        return None
+    rows = [_split(line, table.separator) for line in lines[table.line :] if line.strip()]
+    place = max(table.columns["time"], table.columns.get("bus", 0))
+    rows = [row for row in rows if len(row) > place]
+    stamps = [_parse_number(row[table.columns["time"]].strip()) for row in rows]
+    known = [stamp for stamp in stamps if stamp is not None]
+    if not known or any(stamp.denominator != 1 for stamp in known):
+        return None
+    buses = len({row[table.columns["bus"]] for row in rows}) if "bus" in table.columns else 1
+    span = max(known) - min(known)
+    rates = {unit: len(known) / float(span * UNITS[unit]) for unit in PROPOSED_UNITS if span}
+    fitting = [unit for unit, rate in rates.items() if MIN_RATE <= rate <= buses * MAX_RATE]
+    if len(fitting) != 1:
+        return None
+    reason = f"{rates[fitting[0]]:.0f} frames a second fit a bus, in other units they do not"
+    return table.time_name, fitting[0], reason
 
 
 def _read_head(number: int, line: str, separator: str) -> FrameTable | None:
@@ -209,14 +243,19 @@ def _read_stamps(
 ) -> list[Fraction | None]:
     """Return the stamps [s] of the frames; None for a text that is no stamp."""
     texts = [text for _, text, _ in frames]
-    first = next((text for text in texts if DECIMAL.fullmatch(text)), "")
-    if not first:
+    numbers = [_parse_number(text) for text in texts]
+    if all(number is None for number in numbers):
         return _read_dates(table, texts, date_order)
-    numbers = [
-        Fraction(text.replace(",", ".")) if DECIMAL.fullmatch(text) else None for text in texts
-    ]
     factor = _time_unit(table, frames, numbers, time, unit)
     return [None if number is None else factor * number for number in numbers]
+
+
+def _parse_number(text: str) -> Fraction | None:
+    """Return a time stamp exactly; None for a text that is no number or none of a time."""
+    if len(text) > MAX_STAMP_LENGTH or not DECIMAL.fullmatch(text):
+        return None
+    number = Fraction(text.replace(",", "."))
+    return number if abs(number) < MAX_STAMP else None
 
 
 def _read_dates(table: FrameTable, texts: Sequence[str], date_order: str) -> list[Fraction | None]:

@@ -21,6 +21,7 @@ import numpy as np
 from engine.recordings.can_database import read_databases
 from engine.recordings.can_log import CanFrame, CanLog, FrameKey, remove_repeated_frames
 from engine.recordings.can_reader import decode_can, import_can
+from engine.recordings.mdf_layout import explain_outside
 from engine.recordings.recording_file import (
     NO_VALUE,
     Assumption,
@@ -97,6 +98,8 @@ def _open_mdf(asammdf: Any, data: bytes, source: Source) -> Any:
             return asammdf.MDF(io.BytesIO(data))
     except Exception as error:
         message = first_line(error)
+        if "BytesIO" in message:  # the name of an object of Python
+            message = "its blocks cannot be read"
     finally:
         gc.collect()  # destructors of broken objects run while their errors are suppressed
         sys.unraisablehook = hook
@@ -211,6 +214,7 @@ class _MdfFile:
         count = 0
         for group, index in self.places[CAN_FRAMES]:
             self._require_rows(CAN_FRAMES, group)
+            self._require_inside((group, index))
             try:
                 signal = self.mdf.get(group=group, index=index)
                 table, stamps = signal.samples, signal.timestamps.tolist()
@@ -248,6 +252,18 @@ class _MdfFile:
             label += f"more than a file of {self.size} bytes can have"
             raise unreadable_error(self.source, f"understood: {label}")
 
+    def _require_inside(self, place: Place) -> None:
+        """Raise SpecError if a channel lies outside of its records, or if that is not known.
+
+        The library would read other memory.
+        """
+        try:
+            reason = explain_outside(self.mdf, *place)
+        except Exception as error:  # the library raises errors of any type for a broken file
+            reason = first_line(error)
+        if reason:
+            raise unreadable_error(self.source, f"understood, it may be damaged: {reason}")
+
     def _samples(self, name: str) -> Samples:
         """Return the samples of a channel; arrays are NaN.
 
@@ -257,6 +273,7 @@ class _MdfFile:
         """
         (place,) = self.places[name]
         self._require_rows(name, place[0])
+        self._require_inside(place)
         try:
             signal = self.mdf.get(group=place[0], index=place[1], ignore_invalidation_bits=True)
             values = np.asarray(signal.samples)
@@ -305,6 +322,7 @@ class _MdfFile:
         time = self.mapping.time
         own = next((c for g, c in self.places.get(time, ()) if g == place[0]), None)
         if own is not None:
+            self._require_inside((place[0], own))
             cells = self.mdf.get(group=place[0], index=own).samples
             factor = self.mapping.time_unit.factor
             return [stamp * factor for stamp in self._exact_stamps(cells)]

@@ -8,8 +8,14 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
-from engine.recordings.recording_file import RecordedFile, Samples, require_size, unreadable_error
-from engine.recordings.text_dialect import MISSING_WORDS
+from engine.recordings.recording_file import (
+    Assumption,
+    RecordedFile,
+    Samples,
+    require_size,
+    unreadable_error,
+)
+from engine.recordings.text_dialect import DECIMAL, MISSING_WORDS
 from engine.results.pyarrow_import import import_pyarrow
 from language.overlays.expand_document import display_path
 from language.text.diagnostic import Source, Span
@@ -37,7 +43,16 @@ def read_parquet(path: Path) -> RecordedFile:
         def text(k: int) -> str:
             return _to_text(cells[k])
 
-        return Samples([_to_float(cell) for cell in cells], text, lambda k: Span(source, k + 1, 1))
+        def place(k: int) -> Span:
+            return Span(source, k + 1, 1)
+
+        values = [_to_float(cell) for cell in cells]
+        count = sum(
+            isinstance(cell, str) and value is not None and math.isfinite(value)
+            for cell, value in zip(cells, values, strict=True)
+        )
+        note = Assumption(f"column `{name}`", f"{count} numbers", "the table has them as texts")
+        return Samples(values, text, place, assumptions=(note,) if count else ())
 
     return RecordedFile(source, "column", table.column_names, read, table.num_rows)
 
@@ -54,10 +69,14 @@ def _to_text(cell: Any) -> str:
 def _to_float(cell: Any) -> float | None:
     """Return a cell as float; None for a missing value, also NaN; NaN for a cell of another type.
 
-    A text counts as missing if it is blank or a word for a missing value (`MISSING_WORDS`).
+    A text counts as missing if it is blank or a word for a missing value (`MISSING_WORDS`). Another
+    text is the number that it writes with a decimal point.
     """
-    if isinstance(cell, str) and (not cell.strip() or cell.strip().casefold() in MISSING_WORDS):
-        return None
+    if isinstance(cell, str):
+        written = cell.strip()
+        if not written or written.casefold() in MISSING_WORDS:
+            return None
+        return float(written) if DECIMAL.fullmatch(written) else math.nan
     if cell is None or (isinstance(cell, float) and math.isnan(cell)):
         return None
     return float(cell) if isinstance(cell, int | float | Decimal) else math.nan

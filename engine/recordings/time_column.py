@@ -25,6 +25,8 @@ from language.expressions.units import SECOND, Unit, are_compatible, is_same_uni
 from language.model.system import RecordingMap
 from language.text.diagnostic import Problems, Span
 
+ROUNDED_STAMP = re.compile(r"[+-]?(\d(?:[.,]\d{1,5})?)[eE][+-]?\d+", re.ASCII)
+"""Pattern of a number with an exponent and few digits."""
 MAX_STAMP_LENGTH = 40
 """Largest number of characters of a time stamp."""
 TIME_LIMIT = 10**12
@@ -96,7 +98,7 @@ class TimeColumnReader:
             if value is not None:
                 number = number or 0.0
                 if last is not None and number <= rounded and value <= last:
-                    report_unsorted(text, last, samples.place(k), self.problems)
+                    report_unsorted(text, value, last, samples.place(k), self.problems)
                 last, rounded = value, number
             result.append(value)
         return result
@@ -152,7 +154,7 @@ class TimeColumnReader:
             if form.kind == "clock" and last is not None and last - value >= MIDNIGHT_STEP:
                 days, value = days + 1, value + SECONDS_OF_DAY
             if last is not None and value <= last:
-                report_unsorted(text, last, samples.place(k), self.problems)
+                report_unsorted(text, value, last, samples.place(k), self.problems)
             last = value
             result.append(value)
         self._note_calendar(name, form, days, bool(with_zone))
@@ -184,15 +186,27 @@ class TimeColumnReader:
         if not text:
             return "no time stamp", ""
         help = explain_time_text(text)
+        if text.casefold() in (name.casefold() for name in self.file.names):
+            help = "the names of the columns stand here again: split recordings that follow each "
+            help += "other"
         if DECIMAL.fullmatch(text) and len(text) <= MAX_STAMP_LENGTH:
             help = _propose_epoch_unit(Fraction(text), self.mapping.time_unit)
         return _explain_stamp(text), help
 
 
-def report_unsorted(text: str, last: Fraction, place: Span, problems: Problems) -> None:
-    """Report a time stamp that is not above the previous one."""
+def report_unsorted(
+    text: str, value: Fraction, last: Fraction, place: Span, problems: Problems
+) -> None:
+    """Report a time stamp (`text`, with its value) that is not above the previous one."""
     label = f"the time stamp {text} is not above the one before, {float(last)!r}"
-    hint = "sort the recording, and remove repeated rows"
+    rounded = ROUNDED_STAMP.fullmatch(text)
+    if value < last:
+        hint = "sort the recording; if its clock begins anew here, split it"
+    elif rounded:
+        hint = f"the stamps have only {sum(c.isdigit() for c in rounded[1])} digits: a spreadsheet "
+        hint += "writes what it shows"
+    else:
+        hint = "sort the recording, and remove repeated rows"
     problems.error("time", place, label, hint)
 
 

@@ -21,14 +21,14 @@ from diagnosis.data_quality.recording_check import (
 )
 from diagnosis.data_quality.recording_map_inference import (
     guess_map,
-    guess_time,
+    open_without_map,
     read_database_option,
     unmapped,
 )
 from diagnosis.data_quality.recording_map_proposal import propose_columns
 from diagnosis.data_quality.recording_map_text import format_map, map_name
 from diagnosis.pipeline.diagnosis_case import Case
-from engine.recordings.recording import Recording, open_recording, read_recording
+from engine.recordings.recording import Recording, read_recording
 from engine.recordings.recording_window import strip_window_suffix
 from language.expressions.name_rules import NAME_PATTERN
 from language.loading.load import automaton_of, load_automaton
@@ -167,9 +167,8 @@ def propose_map(
     if len({bool(one.bus) for one in found}) > 1:
         raise ValueError("either each database has a bus (`can0=a.dbc`) or none has one")
     problems = Problems()
-    recorded = open_recording(path, unmapped("proposed", place, found), problems)
-    problems.raise_if_errors()
-    time, unit, _ = guess_time(recorded)
+    empty = unmapped("proposed", place, found)
+    recorded, time, unit, _ = open_without_map(path, empty, problems)
     proposal = propose_columns(recorded, automaton, time)
     if not proposal.columns:
         label = f"no column fits an input or output of `{automaton.name}`"

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import contextlib
+import gzip
 import io
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import asammdf
+import can
 import numpy as np
 import pyarrow
 import pyarrow.parquet
@@ -102,7 +105,19 @@ def write_project(folder: Path) -> Path:
     pyarrow.parquet.write_table(table, folder / "run.parquet")
     with contextlib.redirect_stdout(io.StringIO()):
         measured = asammdf.MDF(version="4.10")
-        measured.append([asammdf.Signal(np.array(VALUES), stamps, name="u", unit="Nm")])
+        flags = np.array([k % 7 == 3 for k in range(len(VALUES))])
+        names = {"val_0": 0, "text_0": "off", "val_1": 1, "text_1": "on", "default": b"?"}
+        bits = np.array([k % 2 for k in range(len(VALUES))], dtype=np.uint8)
+        raw = np.round(np.array(VALUES) * 10).astype(np.int16)
+        measured.append(
+            [
+                asammdf.Signal(np.array(VALUES), stamps, "Nm", "u", invalidation_bits=flags),
+                asammdf.Signal(bits, stamps, name="key", conversion=names),
+                asammdf.Signal(raw, stamps, "A", "i", conversion={"a": 0.1, "b": 0.0}),
+            ]
+        )
+        note = np.array([f"note {k}".encode() for k in range(20)])
+        measured.append([asammdf.Signal(note, stamps[:20], name="note", encoding="utf-8")])
         measured.save(folder / "run.mf4")
         measured.close()
     frames = [int(value / 0.25) & 0xFFFF for value in VALUES]
@@ -112,6 +127,18 @@ def write_project(folder: Path) -> Path:
     asc = [f"{0.01 * k:.6f} 1 100 Rx d 4 {bytes.fromhex(w).hex(' ')}" for k, w in enumerate(words)]
     head = ["date Mon Jan 1 10:00:00.000 am 2024", "base hex timestamps absolute"]
     (folder / "run.asc").write_text("\n".join([*head, *asc]) + "\n", "utf-8")
+    starts = [f"{10000 * k},00000100,false,0,4,{word}" for k, word in enumerate(words)]
+    frame_rows = [",".join([row[:-9], *re.findall("..", row[-8:])]) for row in starts]
+    first = "Time Stamp,ID,Extended,Bus,LEN,D1,D2,D3,D4"
+    (folder / "frames.csv").write_text("\n".join([first, *frame_rows]) + "\n", "utf-8")
+    trc = [f"{k + 1:6})   {10 * k:8}.0  Rx  0100  4  {bytes.fromhex(w).hex(' ')}" for k, w in
+           enumerate(words)]  # fmt: skip
+    (folder / "run.trc").write_text("\n".join([";$FILEVERSION=1.1", *trc]) + "\n", "utf-8")
+    with can.BLFWriter(folder / "run.blf") as writer:
+        for k, word in enumerate(words):
+            data = bytes.fromhex(word)
+            writer(can.Message(1.0 + 0.01 * k, 0x100, is_extended_id=False, channel=0, data=data))
+    (folder / "run.csv.gz").write_bytes(gzip.compress((folder / "run.csv").read_bytes()))
     trajectory = simulation.simulate("rig", "push", root=folder)
     for name in ("sim.csv", "other.csv", "sim.parquet"):
         runs.save(trajectory, folder / name)
@@ -229,6 +256,10 @@ SUBJECTS: dict[str, Subject] = {
     "mf4": Subject("run.mf4", replay("run.mf4")),
     "candump": Subject("run.log", replay("run.log"), TEXT),
     "asc": Subject("run.asc", replay("run.asc"), TEXT),
+    "trc": Subject("run.trc", replay("run.trc"), TEXT),
+    "blf": Subject("run.blf", replay("run.blf")),
+    "table of frames": Subject("frames.csv", replay("frames.csv"), TEXT),
+    "csv in gzip": Subject("run.csv.gz", replay("run.csv.gz")),
     "dbc": Subject("car.dbc", replay("run.log"), TEXT),
     "map": Subject("spec/bench.yaml", replay("run.csv"), (*TEXT, mark, comment)),
     "spec": Subject(

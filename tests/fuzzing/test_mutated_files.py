@@ -6,6 +6,7 @@ number of the mutation, which reproduces it.
 
 from __future__ import annotations
 
+import csv
 import os
 import shutil
 import signal
@@ -19,15 +20,23 @@ from typing import Any
 
 import pytest
 
+from engine.recordings.recording import read_recording
+from language.loading.recording_map_reader import read_map
+from language.overlays.expand_document import Project, read_document
 from language.text.diagnostic import DataError, SpecError
 from modewright.runtime.output_files import OutputError
 from tests.fuzzing.mutations import mutate
+from tests.fuzzing.other_readers import READERS, is_close
 from tests.fuzzing.subjects import SUBJECTS, generate, write_project
 
 pytestmark = pytest.mark.long
 
 COUNT = int(os.environ.get("MODEWRIGHT_MUTATIONS", "25"))
 """Number of mutations of each subject."""
+SEALED = ("side file", "store")
+"""Subjects beside the values of a run: a change of them changes no value."""
+READ_TWICE = ("mf4", "mf4 without map", "blf")
+"""Subjects that libraries in C read, which might read other memory."""
 LONGEST_SECONDS = 20.0
 """Time limit of a reading."""
 REASONS = (SpecError, DataError, OutputError)
@@ -108,6 +117,10 @@ def test_a_mutated_file_is_read_or_refused(
                 failures.append(f"{number}: no reason")
             if subject == "cache" and (outcome, result) != expected:
                 failures.append(f"{number}: a damaged cache changes the result")
+            if subject in SEALED and outcome == "read" and result != expected[1]:
+                failures.append(f"{number}: a damaged file gives another result")
+            if subject in READ_TWICE and (outcome, result) != read(subject, folder):
+                failures.append(f"{number}: a second reading gives another result")
         except BaseException as error:
             if isinstance(error, KeyboardInterrupt):
                 raise
@@ -139,3 +152,32 @@ def test_a_mutation_that_changes_nothing_changes_no_result(
     outcome, result = read(subject, folder)
     assert outcome == "read", result
     assert result == expected[1]
+
+
+@pytest.mark.parametrize("subject", READERS)
+def test_no_mutated_file_differs_silently(subject: str, pristine: Path, tmp_path: Path) -> None:
+    """A file that is read has the values of another reader, or what is assumed is told."""
+    mutated, recording, other_reader = READERS[subject]
+    folder = tmp_path / "project"
+    shutil.copytree(pristine, folder)
+    mapping = read_map(read_document(folder / "spec" / "bench.yaml"), Project(folder))
+    failures: list[str] = []
+    original = (pristine / mutated).read_bytes()
+    compared = 0
+    for number in range(COUNT):
+        (folder / mutated).write_bytes(mutate(original, f"{subject} {number}"))
+        try:
+            found = read_recording(folder / recording, mapping, ["u"])
+        except REASONS:
+            continue
+        try:
+            other = other_reader(folder)
+        except (ValueError, csv.Error):
+            other = None
+        channel = found.channels["u"]
+        own = list(zip(map(float, channel.times), channel.values, strict=True))
+        compared += other is not None
+        if not found.assumptions and (other is None or not is_close(own, other)):
+            failures.append(f"{number}: {'irregular' if other is None else 'other values'}")
+    assert not failures, f"{len(failures)} of {COUNT} mutations:\n" + "\n".join(failures)
+    assert compared or COUNT < 100  # few mutations leave a file regular

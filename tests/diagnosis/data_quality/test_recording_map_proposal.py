@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -107,6 +108,79 @@ def test_units_names_and_parameters_assign_the_columns(tmp_path: Path) -> None:
 def test_habits_of_naming_are_understood(tmp_path: Path, torque: str, speed: str) -> None:
     text = table(**{"x9": WAVE, speed: 900 + 50 * WAVE, torque: 80 * RAMP})
     assert signals(propose(tmp_path, text)) == {"T_em": torque, "w_em": speed}
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["em_speed_max", "em_speed_AliveCounter", "em_speed_status", "QU_em_speed", "em_speed_limit"],
+)
+def test_a_limit_or_a_counter_is_not_the_quantity(tmp_path: Path, name: str) -> None:
+    text = table(**{name: 900 + 50 * WAVE, "motor_rate": 900 + 60 * WAVE, "em_torque_Nm": RAMP})
+    assert signals(propose(tmp_path, text))["w_em"] == "motor_rate"
+
+
+FRAMES = """\
+VERSION ""
+NS_ :
+BS_:
+BU_: ECU
+BO_ 256 Motor: 4 ECU
+ SG_ em_torque : 0|16@1- (0.25,0) [0|0] "Nm" ECU
+ SG_ em_speed : 16|16@1- (1,0) [0|0] "rpm" ECU
+BO_ 512 Wheels: 4 ECU
+ SG_ wheel_l : 0|16@1- (0.01,0) [0|0] "km/h" ECU
+ SG_ wheel_r : 16|16@1- (0.01,0) [0|0] "km/h" ECU
+"""
+
+
+def frame_table(unit: float, buses: tuple[int, ...] = (0,)) -> str:
+    """Return a table of frames with whole stamps in a unit [s], two messages every 10 ms.
+
+    The message of the motor is on bus 0 only.
+    """
+    rows = ["Time,ID,Bus,Length,Data"]
+    for k in range(N):
+        for bus in buses:
+            messages = ((256, 4 * k, 900 + k), (512, 100 * k, 100 * k + 1))
+            for key, a, b in messages[bus:]:
+                data = struct.pack("<hh", a, b).hex(" ")
+                rows.append(f"{round((5 + 0.01 * k) / unit)},0x{key:X},{bus},4,{data}")
+    return "\n".join(rows) + "\n"
+
+
+def propose_from_frames(folder: Path, text: str) -> RecordingMap:
+    (folder / "spec").mkdir()
+    (folder / "spec" / "rig.yaml").write_text(SPEC, "utf-8")
+    (folder / "car.dbc").write_text(FRAMES, "utf-8")
+    (folder / "frames.csv").write_text(text, "utf-8")
+    written = propose_map(folder / "frames.csv", "rig", [str(folder / "car.dbc")], root=folder)
+    document = parse_document(Source("map.yaml", tuple(written.splitlines())), written)
+    mapping = read_map(document, Project(folder))
+    assert read_recording(folder / "frames.csv", mapping, list(mapping.columns)).channels
+    return mapping
+
+
+@pytest.mark.parametrize(("unit", "name"), [(1e-3, "ms"), (1e-6, "us"), (1e-9, "ns")])
+def test_the_unit_of_whole_stamps_follows_from_the_rate_of_frames(
+    tmp_path: Path, unit: float, name: str
+) -> None:
+    mapping = propose_from_frames(tmp_path, frame_table(unit))
+    assert (mapping.time, mapping.time_unit.text) == ("Time", name)
+    assert signals(mapping) == {
+        "T_em": "em_torque", "w_em": "em_speed", "w_w": "wheel_l+wheel_r",
+    }  # fmt: skip
+
+
+def test_a_rate_that_no_bus_has_gives_no_unit(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match="the unit of the time `Time` is not known"):
+        propose_from_frames(tmp_path, frame_table(3.0))
+
+
+def test_sensors_on_two_buses_are_no_mean(tmp_path: Path) -> None:
+    mapping = propose_from_frames(tmp_path, frame_table(1e-3, (0, 1)))
+    wheel = column(mapping, "w_w")
+    assert {name.split(".")[0] for name in wheel.columns} in ({"CAN0"}, {"CAN1"})
+    assert len(wheel.columns) == 2
 
 
 def test_without_a_unit_the_range_of_the_signal_tells_it(tmp_path: Path) -> None:

@@ -140,6 +140,45 @@ class TestStatements:
             assert "help: `git lfs pull` fetches the file itself" in text
 
 
+class TestSignalsWithoutAValue:
+    """cantools fails at a frame, or needs minutes to load such a file."""
+
+    @pytest.mark.parametrize(
+        "place", ["-1|8@1+", "-16|16@1-", "99999999|8@1+", "0|999999999@1+", "7|80000@0+"]
+    )
+    def test_bits_outside_of_a_message_are_left_out_and_told(
+        self, tmp_path: Path, place: str
+    ) -> None:
+        dbc = MOTOR + f' SG_ x : {place} (1,0) [0|0] "" ECU\n'
+        found = read(write(tmp_path, "a.log", motor_lines(), dbc), MAP)
+        assert values_of(found) == TORQUES
+        (note,) = notes_of(found)
+        assert "line 8 (`SG_ x :`) has bits outside of a message of 4095 bytes" in note
+
+    @pytest.mark.parametrize("place", ["0|8@11e3-", "0|8@2+", "0|8@1", "0|8@"])
+    def test_a_signal_without_its_byte_order_is_left_out(self, tmp_path: Path, place: str) -> None:
+        dbc = MOTOR + f' SG_ x : {place} (1,0) [0|0] "" ECU\n'
+        found = read(write(tmp_path, "a.log", motor_lines(), dbc), MAP)
+        assert values_of(found) == TORQUES
+        (note,) = notes_of(found)
+        assert "line 8 (`SG_ x :`) does not state the order of its bytes and its sign" in note
+
+    @pytest.mark.parametrize("length", [8, 24, 31])
+    def test_a_floating_point_signal_of_a_wrong_size_is_refused(
+        self, tmp_path: Path, length: int
+    ) -> None:
+        dbc = MOTOR + f' SG_ x : 0|{length}@1+ (1,0) [0|0] "" ECU\nSIG_VALTYPE_ 256 x : 1;\n'
+        path = write(tmp_path, "a.log", motor_lines(), dbc)
+        assert values_of(read(path, MAP)) == TORQUES
+        text = told(path, column("x", "1"))
+        assert f"the DBC calls it a floating-point number of {length} bits" in text
+
+    @pytest.mark.parametrize("factor", ["1e308", "-1e308", "1" + "0" * 400])
+    def test_a_value_that_no_float_holds_is_told(self, tmp_path: Path, factor: str) -> None:
+        path = write(tmp_path, "a.log", motor_lines(), MOTOR.replace("0.25,0", f"{factor},0"))
+        assert "is not a finite number" in told(path, MAP)
+
+
 class TestMultiplexers:
     def test_a_long_name_of_a_multiplexer_still_selects(self, tmp_path: Path) -> None:
         long_name = "Index_that_is_longer_than_the_32_letters_of_a_name"

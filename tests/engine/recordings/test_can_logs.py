@@ -112,6 +112,91 @@ class TestBadItems:
         assert values_of(found) == TORQUES
         assert notes_of(found) == [f"lines: 1 left out (line 4 is no complete frame: `{line}`)"]
 
+    @pytest.mark.parametrize("digits", [310, 1000, 4000])
+    @pytest.mark.parametrize("name", ["a.log", "a.asc", "a.csv"])
+    def test_a_frame_without_a_finite_time_is_left_out_and_told(
+        self, tmp_path: Path, name: str, digits: int
+    ) -> None:
+        stamps = [f"{0.01 * k:.6f}" for k in range(3)] + ["9" * digits + ".0"]
+        form = {
+            "a.log": "({}) can0 100#08006400",
+            "a.asc": "   {} 1  100             Rx   d 4 08 00 64 00",
+            "a.csv": "{},0x100,08 00 64 00",
+        }[name]
+        head = {"a.log": "", "a.asc": ASC, "a.csv": "time,id,data\n"}[name]
+        text = head + "".join(form.format(stamp) + "\n" for stamp in stamps)
+        found = read(write(tmp_path, name, text), MAP)
+        assert values_of(found) == (2.0, 2.0, 2.0)
+        assert any("left out" in note for note in notes_of(found))
+
+    @pytest.mark.parametrize("name", ["a.csv", "a.txt", "a.log"])
+    @pytest.mark.parametrize(
+        "row", ["0.0,0x100,08 0G", "0.0,junk,08 00", "1e999999999,0x100,08 00"]
+    )
+    def test_a_table_without_a_frame_is_told(self, tmp_path: Path, name: str, row: str) -> None:
+        text = "time,id,data\n" + f"{row}\n" * 3
+        assert "error: this is no log of CAN frames" in told(write(tmp_path, name, text), MAP)
+
+    @pytest.mark.parametrize(
+        "line",
+        [
+            "1  100             Rx   d 4 08 0 64 00", "1  100             Rx   d 4 08 001 64 00",
+            "1  100             Rx   d 4 08 00 64", "1  100             Rx   d 4 08 00 64 00 11",
+            "1  100             Rx:  d 4 08 00 64 00", "1  100             Rx   ` 4 08 00 64 00",
+            "1  ff100           Rx   d 4 08 00 64 00", "1  100             Rx   d 1f 08 00 64 00",
+        ],
+    )  # fmt: skip
+    def test_a_damaged_frame_of_asc_is_left_out_and_told(self, tmp_path: Path, line: str) -> None:
+        rows = ["1  100             Rx   d 4 08 00 64 00"] * 3 + [line]
+        text = ASC + "".join(f"   {0.01 * k:.6f} {row}\n" for k, row in enumerate(rows))
+        found = read(write(tmp_path, "a.asc", text), MAP)
+        assert values_of(found) == (2.0, 2.0, 2.0)
+        assert [note.split(":")[0] for note in notes_of(found)] == ["lines"]
+
+    @pytest.mark.parametrize(
+        "line",
+        ["V9 13 25 0 0 620 x 4", "PktEth: Tx 01020304", "junk"],
+    )
+    def test_other_lines_of_asc_are_told(self, tmp_path: Path, line: str) -> None:
+        rows = ["1  100             Rx   d 4 08 00 64 00"] * 3 + [line]
+        text = ASC + "".join(f"   {0.01 * k:.6f} {row}\n" for k, row in enumerate(rows))
+        found = read(write(tmp_path, "a.asc", text), MAP)
+        assert values_of(found) == (2.0, 2.0, 2.0)
+        (note,) = notes_of(found)
+        assert note.startswith(
+            "other lines: 1 left out (they are no frames of a CAN bus; line 7: `"
+        )
+
+    @pytest.mark.parametrize(
+        "line",
+        [
+            "1  Statistic: D 0 R 0 XD 0", "Start of measurement", "log trigger event",
+            "1  100  Rx d 4 08 00 64 00  Length = 1 BitCount = 2",
+        ],
+    )  # fmt: skip
+    def test_events_of_asc_are_not_told(self, tmp_path: Path, line: str) -> None:
+        rows = [line] + ["1  100             Rx   d 4 08 00 64 00"] * 3
+        text = ASC + "".join(f"   {0.01 * k:.6f} {row}\n" for k, row in enumerate(rows))
+        assert notes_of(read(write(tmp_path, "a.asc", text), MAP)) == []
+
+    @pytest.mark.parametrize("header", ["base hex", "base hex timestamp absolute", "base dec time"])
+    def test_stamps_that_the_head_does_not_explain_are_told(
+        self, tmp_path: Path, header: str
+    ) -> None:
+        text = ASC.replace("base hex  timestamps absolute", header)
+        text += "".join(f"   {0.01 * k:.6f} 1  100  Rx   d 1 08\n" for k in range(3))
+        dbc = MOTOR.replace("Motor: 4", "Motor: 1").replace("0|16", "0|8")
+        text = text.replace(" 100 ", " 256 ") if "dec" in header else text
+        (note,) = notes_of(read(write(tmp_path, "a.asc", text, dbc), MAP))
+        assert note.startswith("time stamps: absolute (the header does not state whether")
+
+    @pytest.mark.parametrize("data", ["100#" + "00" * 9, "100##1" + "00" * 65, "100#" + "11" * 40])
+    def test_a_frame_of_too_many_bytes_is_left_out(self, tmp_path: Path, data: str) -> None:
+        path = write(tmp_path, "a.log", motor_lines() + candump((2.0, "can0", data)))
+        found = read(path, MAP)
+        assert values_of(found) == TORQUES
+        assert notes_of(found)[0].startswith("lines: 1 left out (line 4 is no complete frame")
+
     def test_a_cut_line_of_asc_is_left_out_and_told(self, tmp_path: Path) -> None:
         line = "   {:.6f} 1  100             Rx   d 4 08 00 64 00"
         text = "\n".join(line.format(0.01 * k) for k in range(3))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -230,3 +231,63 @@ class TestDamage:
         assert values_of(found) == (1.0,)
         path = write(tmp_path / "a.mf4", signal([1.0, math.inf]))
         assert "a.mf4:2:1: error: `inf` in channel `T_em`" in told(path, MAP)
+
+
+BYTE_OFFSET, BIT_COUNT, INVALIDATION_BIT = 4, 8, 16
+"""Places of the fields of a channel behind the links of its block."""
+
+
+def damage(path: Path, kind: int, field: int, number: int) -> Path:
+    """Write a number into a field of the channels of a type (0 values, 1 texts, 2 master)."""
+    data = bytearray(path.read_bytes())
+    start = data.find(b"##CN")
+    while start >= 0:
+        (links,) = struct.unpack_from("<Q", data, start + 16)
+        fields = start + 24 + 8 * links
+        if data[fields] == kind:
+            struct.pack_into("<I", data, fields + field, number)
+        start = data.find(b"##CN", start + 4)
+    path.write_bytes(data)
+    return path
+
+
+class TestPlacesOutsideOfTheData:
+    """asammdf reads the memory behind the data without a check, or ends the process."""
+
+    @pytest.mark.parametrize("kind", [0, 2])
+    @pytest.mark.parametrize(
+        ("field", "number"),
+        [
+            (BYTE_OFFSET, 136), (BYTE_OFFSET, 9), (BYTE_OFFSET, 1 << 24), (BYTE_OFFSET, 0xFFFFFFFF),
+            (BIT_COUNT, 640), (BIT_COUNT, 0xFFFFFFF8),
+        ],
+    )  # fmt: skip
+    def test_a_channel_outside_of_its_records_is_refused(
+        self, tmp_path: Path, kind: int, field: int, number: int
+    ) -> None:
+        path = damage(write(tmp_path / "a.mf4", signal(TORQUES)), kind, field, number)
+        text = told(path, MAP)
+        assert "error: the recording cannot be understood" in text
+        if field == BYTE_OFFSET:
+            assert "of records of 16 bytes" in text
+
+    def test_another_channel_of_the_file_is_read(self, tmp_path: Path) -> None:
+        path = tmp_path / "a.mf4"
+        note = signal([b"a", b"b"], "note", encoding="utf-8")
+        damage(write(path, signal(TORQUES), note), 1, BYTE_OFFSET, 4096)
+        assert values_of(read(path, MAP)) == tuple(TORQUES)
+
+    def test_a_mark_of_invalid_values_outside_of_its_bits_is_refused(self, tmp_path: Path) -> None:
+        flags = np.array([False, True, False, False])
+        path = write(tmp_path / "a.mf4", signal(TORQUES, invalidation_bits=flags))
+        assert len(values_of(read(path, MAP.replace("N*m}", "N*m, blank: skip}")))) == 3
+        damage(path, 0, INVALIDATION_BIT, 1 << 20)
+        assert "has bit 1048576 of 8 that mark invalid values" in told(path, MAP)
+
+    @pytest.mark.parametrize("length", [0x80000000, 0xFFFFFFFF, 100])
+    def test_a_text_outside_of_its_data_is_refused(self, tmp_path: Path, length: int) -> None:
+        path = write(tmp_path / "a.mf4", signal([b"off", b"on", b"off", b"on"], encoding="utf-8"))
+        data = path.read_bytes()
+        assert data.count(b"\x03\x00\x00\x00off") == 2
+        path.write_bytes(data.replace(b"\x03\x00\x00\x00off", struct.pack("<I", length) + b"off"))
+        assert "the value 1 of channel `T_em` lies outside of the file" in told(path, MAP)

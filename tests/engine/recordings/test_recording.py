@@ -188,5 +188,6 @@ class TestAHeadLine:
         assert told("t_s,torque_Nm,speed_rpm,torque_Nm\n1,2,3,4\n") == (
             "drive.csv:1:1: error: there are two columns `torque_Nm`\n"
             "  t_s,torque_Nm,speed_rpm,torque_Nm\n"
-            "  ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^"
+            "  ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^\n"
+            "help: rename one of them in the file"
         )

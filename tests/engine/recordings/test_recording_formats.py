@@ -131,6 +131,29 @@ class TestParquet:
             "3:1: error: the time stamp 0.02 is not above the one before, 0.02",
         ]
 
+    @pytest.mark.parametrize("cell", ["2.5", " 2.5 ", "+2.50", "25e-1"])
+    def test_numbers_that_are_texts_are_read_and_told(self, tmp_path: Path, cell: str) -> None:
+        path = tmp_path / "drive.parquet"
+        write_parquet(path, t_s=["0.01", "0.02"], T_em=["1.0", cell])
+        found = read(path, f"time: {{column: t_s, unit: s}}\n{COLUMNS}", "T_em")
+        assert found.channels["T_em"].values == (1.0, 2.5)
+        assert "column `T_em`: 2 numbers (the table has them as texts)" in [
+            f"{item.subject}: {item.value} ({item.reason})" for item in found.assumptions
+        ]
+
+    @pytest.mark.parametrize("cell", ["2,5", "0x10", "2.5 Nm"])
+    def test_texts_that_are_no_numbers_are_told(self, tmp_path: Path, cell: str) -> None:
+        path = tmp_path / "drive.parquet"
+        write_parquet(path, t_s=[0.01, 0.02], T_em=["1.0", cell])
+        text = told(path, f"time: {{column: t_s, unit: s}}\n{COLUMNS}", "T_em")
+        assert f"`{cell}` in column `T_em` is not a finite number" in text
+
+    def test_the_columns_of_the_file_are_named(self, tmp_path: Path) -> None:
+        path = tmp_path / "drive.parquet"
+        write_parquet(path, __index_level_0__=[0.01, 0.02], T_em=[1.0, 2.0])
+        text = told(path, f"time: {{column: t_s, unit: s}}\n{COLUMNS}", "T_em")
+        assert "help: the file has `__index_level_0__`, `T_em`" in text
+
     def test_junk_and_a_cut_off_file_are_told(self, tmp_path: Path) -> None:
         path = tmp_path / "drive.parquet"
         write_parquet(path, t_s=[0.01, 0.02], T_em=[1.0, 2.0])

@@ -206,7 +206,7 @@ def test_a_column_that_is_not_there_is_told_with_the_nearest_name(
     assert run("odd.csv", "--spec", "small_driveline") == 1
     text = " ".join(capsys.readouterr().out.split())
     assert "there is no column `torque`, which map `bench` reads; did you mean `Torque`?" in text
-    assert "error: there are two columns `motor` (odd.csv)" in text
+    assert "error: there are two columns `motor`; rename one of them in the file (odd.csv)" in text
     assert "error: there is no column `wheel`" in text
 
 
@@ -287,3 +287,64 @@ def test_a_unit_that_is_not_understood_is_told_without_a_map(
     path.write_text(f"{head}\n{units}\n{rest}", "utf-8")
     run("unit.csv")
     assert "has the unit `furlong`, which is not understood" in capsys.readouterr().out
+
+
+def test_a_channel_with_words_among_its_numbers_is_left_out(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asammdf, np = pytest.importorskip("asammdf"), pytest.importorskip("numpy")
+    stamps = np.arange(300) * 0.01
+    words = {"val_0": 5, "text_0": "red", "default": None}
+    raw = np.where(np.arange(300) < 10, 5, 7).astype("u1")
+    signals = [
+        asammdf.Signal(80 * np.sin(stamps), stamps, "Nm", "torque"),
+        asammdf.Signal(raw, stamps, name="lamp", conversion=words),
+    ]
+    with asammdf.MDF(version="4.10") as mdf:
+        mdf.append(signals)
+        mdf.save(project / "lamp.mf4")
+    run("lamp.mf4")
+    text = " ".join(capsys.readouterr().out.split())
+    assert "`lamp` (lamp.mf4): has text, such as `red`: left out" in text.replace("'", "`")
+    assert "not a finite number" not in text
+
+
+def test_the_unit_of_time_of_a_table_of_frames_is_told(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [f"{1000 + 10 * k},0x100,{k % 200:02x} 00" for k in range(300)]
+    (project / "frames.csv").write_text("\n".join(["Time,ID,Data", *rows]) + "\n", "utf-8")
+    dbc = 'VERSION ""\nNS_ :\nBS_:\nBU_: E\nBO_ 256 M: 2 E\n SG_ u : 0|8@1+ (1,0) [0|0] "Nm" E\n'
+    (project / "car.dbc").write_text(dbc, "utf-8")
+    run("frames.csv", "--dbc", "car.dbc")
+    text = " ".join(capsys.readouterr().out.split())
+    assert "the time `Time` is taken in ms: 100 frames a second fit a bus" in text
+
+
+@pytest.mark.parametrize("command", ["check", "map"])
+@pytest.mark.parametrize("kind", ["folder", "pipe", "device", "loop", "dangling", "empty"])
+def test_what_is_no_file_is_refused(project: Path, command: str, kind: str) -> None:
+    path = project / "odd.csv"
+    if kind == "folder":
+        path.mkdir()
+    elif kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "empty":
+        path.touch()
+    else:
+        path.symlink_to({"device": "/dev/zero", "loop": "odd.csv", "dangling": "no.csv"}[kind])
+    words = ["recording", command, "odd.csv"]
+    words += ["--spec", "small_driveline"] if command == "map" else []
+    code = run_with_exit_code(lambda: app(words, standalone_mode=False))
+    assert code == 1
+
+
+@pytest.mark.parametrize("name", ["a\nb.csv", "a\tb.csv", "a\x1b[31m.csv", "a\u202eb.csv"])
+def test_a_name_of_a_file_stays_on_its_line(
+    project: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    (project / name).write_bytes((project / "drive.csv").read_bytes()[:2000])
+    run(name)
+    text = capsys.readouterr().out
+    assert ascii(name)[1:-1].replace("\\n", "\\x0a").replace("\\t", "\\x09") in text
+    assert name not in text
