@@ -93,7 +93,8 @@ def test_every_name_of_the_walkthrough_is_in_the_code_that_it_walks_through() ->
 def test_what_is_shipped_is_replayed_as_the_page_on_recordings_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "tests").symlink_to(ROOT / "tests")
+    for name in ("modewright", "tests"):
+        (tmp_path / name).symlink_to(ROOT / name)
     monkeypatch.chdir(tmp_path)
     (block,) = re.findall(
         r"```sh\n(.*?)```", (ROOT / "docs" / "recordings.md").read_text(), re.DOTALL
