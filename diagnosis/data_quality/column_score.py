@@ -62,6 +62,7 @@ WEIGHTS = {
     "constant": -1.5,
     "other role": -2.0,
     "out of range": -2.0,
+    "no quantity": -2.5,
 }
 """What speaks for a column as a signal, and against it.
 
@@ -352,7 +353,7 @@ def _score_name(
         score += WEIGHTS["command"]
         reasons.append("its name says command")
     if "monitor" in meaning.roles and "monitor" not in own.roles:
-        score -= 2.5
+        score += WEIGHTS["no quantity"]
     words = {word.casefold() for word in split_words(signal.name)}
     if len(words) > 1 and words <= {word.casefold() for word in split_words(reading.stem)}:
         score += WEIGHTS["words in the name"]
