@@ -5,7 +5,7 @@ The functions are called often by all passes; they use explicit stacks instead o
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from language.ir.ops import (
     Assign,
@@ -147,12 +147,17 @@ def reachable_blocks(name: str, blocks: Mapping[str, Block]) -> set[str]:
 
     Raises KeyError for a block that is not in `blocks`.
     """
+    return reachable_names(name, lambda one: called_blocks(blocks[one]))
+
+
+def reachable_names(name: str, next_of: Callable[[str], Iterable[str]]) -> set[str]:
+    """Return a name and all that follow from it; `next_of` gives those that follow directly."""
     result, stack = set[str](), [name]
     while stack:
-        block_name = stack.pop()
-        if block_name not in result:
-            result.add(block_name)
-            stack += called_blocks(blocks[block_name])
+        one = stack.pop()
+        if one not in result:
+            result.add(one)
+            stack += next_of(one)
     return result
 
 

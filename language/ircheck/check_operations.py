@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 
 from language.ir.ops import (
     Assign,
@@ -17,7 +17,7 @@ from language.ir.ops import (
     Switch,
 )
 from language.ir.program import MODE_VARIABLE, Program
-from language.ir.traversal import block_writes, called_blocks, reachable_blocks
+from language.ir.traversal import block_writes, called_blocks, reachable_names
 from language.ircheck.block_contracts import ENTRIES, written_groups
 from language.ircheck.check_expression import ExpressionChecker
 from language.ircheck.violation import Rule, Violation, operation_place
@@ -28,20 +28,22 @@ READ_ONLY_GROUPS = ("input.", "is_new.")
 
 def check_operations(program: Program) -> Iterator[Violation]:
     """Yield the violations of the operations of all blocks, and of the calls between blocks."""
-    for name in program.blocks:
-        yield from _OperationChecker(program, name).check()
-    graph = list(_check_calls(program))
-    yield from graph
-    if not graph:
-        yield from _check_contracts(program)
+    checker = _OperationChecker(program)
+    for name, block in program.blocks.items():
+        yield from checker.check(name, block)
+    calls = {name: called_blocks(block) for name, block in program.blocks.items()}
+    found = list(_check_calls(program, calls))
+    yield from found
+    if not found:
+        yield from _check_contracts(program, calls)
 
 
-def _check_calls(program: Program) -> Iterator[Violation]:
+def _check_calls(program: Program, calls: Mapping[str, Sequence[str]]) -> Iterator[Violation]:
     """Yield the violations of runs of blocks: missing blocks, cycles, unreached blocks.
 
-    Back ends run each block of a Program without modes.
+    `calls` are the blocks that each block runs directly. Back ends run each block of a Program
+    without modes.
     """
-    calls = {name: called_blocks(block) for name, block in program.blocks.items()}
     has_missing = False
     for name, called in calls.items():
         for missing in sorted(set(called) - calls.keys()):
@@ -51,7 +53,7 @@ def _check_calls(program: Program) -> Iterator[Violation]:
         return
     reached = set[str]()
     for name, called in calls.items():
-        below = set[str]().union(*(reachable_blocks(inner, program.blocks) for inner in called))
+        below = set[str]().union(*(reachable_names(inner, calls.__getitem__) for inner in called))
         if name in below:
             yield Violation("reference", f"block {name}", "it runs itself")
             return
@@ -62,14 +64,17 @@ def _check_calls(program: Program) -> Iterator[Violation]:
             yield Violation("dead-store", f"block {name}", "no entry of the Program runs it")
 
 
-def _check_contracts(program: Program) -> Iterator[Violation]:
-    """Yield a violation for each variable that a block writes and its kind may not write."""
+def _check_contracts(program: Program, calls: Mapping[str, Sequence[str]]) -> Iterator[Violation]:
+    """Yield a violation for each variable that a block writes and its kind may not write.
+
+    `calls` are the blocks that each block runs directly.
+    """
     writes = {name: block_writes(block) for name, block in program.blocks.items()}
     for name in program.blocks:
         allowed = written_groups(name)
         if allowed is None:
             continue
-        reached = reachable_blocks(name, program.blocks)
+        reached = reachable_names(name, calls.__getitem__)
         written = dict.fromkeys(variable for inner in reached for variable in writes[inner])
         for variable in written:
             if variable.partition(".")[0] not in allowed:
@@ -78,11 +83,11 @@ def _check_contracts(program: Program) -> Iterator[Violation]:
 
 
 class _OperationChecker:
-    """A checker of the operations of one block, inner blocks included."""
+    """A checker of the operations of blocks, inner blocks included."""
 
-    def __init__(self, program: Program, name: str) -> None:
+    def __init__(self, program: Program) -> None:
         self.program = program
-        self.name = name
+        self.name = ""
         self.op: Op | None = None
         self.found: list[Violation] = []
         self.expressions = ExpressionChecker(program, self.report)
@@ -90,9 +95,10 @@ class _OperationChecker:
         self.derived = {c.name for c in program.constants if c.kind == "derived"}
         self.numbers = _case_numbers(program)
 
-    def check(self) -> list[Violation]:
-        """Return the violations of the block."""
-        self._check_block(self.program.blocks[self.name])
+    def check(self, name: str, block: Block) -> list[Violation]:
+        """Return the violations of a block."""
+        self.name, self.found = name, []
+        self._check_block(block)
         return self.found
 
     def report(self, rule: Rule, message: str) -> None:
