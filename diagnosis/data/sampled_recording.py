@@ -63,7 +63,7 @@ def reference_time(period: float, length: float) -> float:
     geometric mean of period and length.
     """
     is_shown = MIN_PERIODS * period <= REFERENCE_TIME <= length / MIN_TIMES
-    return REFERENCE_TIME if is_shown else math.sqrt(period * length)
+    return REFERENCE_TIME if is_shown else math.sqrt(period) * math.sqrt(length)
 
 
 @dataclass(frozen=True)

@@ -109,7 +109,7 @@ def recording_reference_time(piece: Recording) -> Fraction:
     seconds = [one.seconds for one in piece.channels.values() if one.column.compare is not None]
     length = float(piece.end - piece.start)
     periods = [float(np.median(np.diff(one))) for one in seconds if len(one) > 1]
-    return Fraction(reference_time(min(periods, default=length), length)).limit_denominator(10**6)
+    return Fraction(f"{reference_time(min(periods, default=length), length):.6g}")
 
 
 def most_excited_piece(piece: Recording, max_length: Fraction) -> Recording:

@@ -14,6 +14,7 @@ from typing import Any
 
 from engine.recordings.frame_text import MAX_EXTENDED, MAX_STANDARD, decode_text
 from engine.recordings.recording_file import Assumption
+from language.text.sanitise import truncate
 
 STATEMENT = re.compile(r'[ \t]*([A-Z][A-Z_]*_|VERSION)(?=[\s:"]|$)')
 """Keyword at the start of a statement."""
@@ -51,10 +52,12 @@ SIGNAL_BITS = re.compile(r"\s*SG_\s[^:\"]*:\s*(?P<start>-?\d+)\s*\|\s*(?P<length
 """The start of a signal up to its first bit and its number of bits."""
 BYTE_ORDER = re.compile(r"\s*SG_\s[^:\"]*:[^@\"]*@\s*[01]\s*[+-]")
 """The start of a signal up to its byte order and sign."""
+MESSAGE_LENGTH = re.compile(r"\s*BO_\s+\d+\s+[^:\"]*:\s*(?P<length>-?\d+)")
+"""The start of a message up to its number of bytes."""
 MAX_BITS = 8 * 4095
-"""Number of bits that a signal ends before: those of the longest message of a transport protocol.
+"""Number of bits of the longest message of a transport protocol.
 
-cantools needs a time in proportion to it.
+cantools needs a time in proportion to the number of a message.
 """
 EXTENDED_BIT = 1 << 31
 """Bit of an identifier in a DBC file that marks an extended one."""
@@ -125,7 +128,7 @@ def read_dbc_text(data: bytes, name: str) -> DbcText:
         keyword = _keyword(lines[0])
         statement = "\n".join(lines)
         if keyword == "BO_":
-            is_kept = _note_identifier(statement, start, extended, text)
+            is_kept = _note_message(statement, start, extended, text)
         if keyword == "SG_" and not is_kept:
             if is_kept is None:
                 why = "is a signal without a message"
@@ -217,8 +220,11 @@ def _explain_signal(statement: str) -> str:
     return ""
 
 
-def _note_identifier(statement: str, start: int, extended: dict[int, int], text: DbcText) -> bool:
-    """Note an identifier that lacks the bit of extended ones; return whether it is one of CAN."""
+def _note_message(statement: str, start: int, extended: dict[int, int], text: DbcText) -> bool:
+    """Note an identifier that lacks the bit of extended ones; return whether a message can be read.
+
+    It has an identifier of CAN and a number of bytes that a message can have.
+    """
     match = IDENTIFIER.match(statement)
     if match is None:
         return bool(statement.strip() != "BO_")
@@ -229,6 +235,11 @@ def _note_identifier(statement: str, start: int, extended: dict[int, int], text:
         if NO_FRAME not in statement:
             why = "has an identifier of more than 29 bits"
             text.left_out.append(explain_left_out(start, statement, why))
+        return False
+    length = MESSAGE_LENGTH.match(statement)
+    if length and not 0 <= int(length["length"]) <= MAX_BITS // 8:
+        why = f"has {truncate(length['length'])} bytes; a message has 0 to {MAX_BITS // 8}"
+        text.left_out.append(explain_left_out(start, statement, why))
         return False
     return True
 

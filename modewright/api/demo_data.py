@@ -7,6 +7,7 @@ The recordings of a DemoMachine have an effect that its model lacks; `truth.json
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import resources
@@ -16,7 +17,7 @@ from typing import Any
 from diagnosis.report.diagnosis_report import DiagnosisReport
 from language.text.arguments import PathText, to_path
 from modewright.api.diagnosis import diagnose
-from modewright.runtime.output_files import make_folder, write_files
+from modewright.runtime.output_files import OutputError, make_folder, write_files
 
 
 @dataclass(frozen=True)
@@ -86,13 +87,16 @@ def demo_files() -> dict[str, bytes]:
 
 
 def write_demo_data(folder: PathText) -> list[Path]:
-    """Write the demo data into a folder, over files of the same names; return the paths.
+    """Write the demo data into a folder; return the paths.
 
-    Raises OutputError.
+    Raises OutputError if a file of the same name has other content, and writes nothing then.
     """
     folder = to_path(folder, "folder")
     make_folder(folder)
     files = {folder / name: data for name, data in demo_files().items()}
+    for path, data in files.items():
+        if os.path.lexists(path) and not (path.is_file() and path.read_bytes() == data):
+            raise OutputError(f"{path}: there is another file of this name; name a new folder")
     for parent in dict.fromkeys(path.parent for path in files):
         make_folder(parent)
     write_files(files)

@@ -13,6 +13,7 @@ from typing import Annotated
 
 import typer
 
+from language.text.diagnostic import DataError
 from language.text.project_boundary import ALLOW_OUTSIDE_ENV
 from modewright.cli.commands.a2l import a2l
 from modewright.cli.commands.calibration import calibration
@@ -133,6 +134,16 @@ def _version(is_wanted: bool) -> None:
         raise typer.Exit
 
 
+def _require_working_folder() -> None:
+    """Raise DataError if the working folder was deleted."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        raise DataError(
+            "the current folder does not exist any more: change to another one"
+        ) from None
+
+
 def options(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="print problems only")] = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="print each step")] = False,
@@ -148,6 +159,7 @@ def options(
     """Hybrid automata in YAML: simulate them, generate C code, keep both in lock-step."""
     if quiet and verbose:
         raise typer.BadParameter("leave out one of them", param_hint="--quiet, --verbose")
+    _require_working_folder()
     require_writable(log_file)
     configure(quiet, verbose, log_file)
     if allow_outside:

@@ -55,7 +55,7 @@ def explain(
 
     if stage not in (*STAGES, *PASSES):
         raise typer.BadParameter(f"one of {', '.join((*STAGES, *PASSES))}", param_hint="--pass")
-    if stop_after and stop_after not in ("lowered", *PASSES):
+    if stop_after is not None and stop_after not in ("lowered", *PASSES):
         choices = ", ".join(("lowered", *PASSES))
         raise typer.BadParameter(f"one of {choices}", param_hint="--stop-after")
     if stop_after and (other or stage != "document"):

@@ -7,7 +7,11 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from diagnosis.data_quality.model_agreement import compare_signals, most_excited_piece
+from diagnosis.data_quality.model_agreement import (
+    compare_signals,
+    most_excited_piece,
+    recording_reference_time,
+)
 from diagnosis.data_quality.output_comparison import OutputComparison
 from engine.recordings.recording import Channel, Recording
 from tests.diagnosis.small_driveline import read_recording_map
@@ -52,3 +56,10 @@ def test_signals_are_compared_in_the_time_of_the_recording(period: float, late: 
     assert found is not None and found.is_clear
     assert found.gain == pytest.approx(2.0, rel=0.1)
     assert found.lag == pytest.approx(period * late, abs=3.0 * period)
+
+
+@pytest.mark.parametrize("period", [Fraction(1, 10**9), Fraction(1, 10**300), Fraction(10**7)])
+def test_the_reference_time_of_any_rate_is_positive(period: Fraction) -> None:
+    times = [k * period for k in range(900)]
+    time = recording_reference_time(recording(times, [float(k % 5) for k in range(900)]))
+    assert 0 < time <= times[-1]

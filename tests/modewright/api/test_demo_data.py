@@ -46,9 +46,28 @@ def test_the_command_writes_what_the_table_names(
         assert checked.check.is_usable
 
 
+@pytest.mark.parametrize("name", ["README.md", "recordings/friction/train_1.csv"])
+@pytest.mark.parametrize("kind", ["file", "folder", "link"])
+def test_a_file_of_the_user_is_kept_and_nothing_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, kind: str
+) -> None:
+    place = tmp_path / name
+    place.parent.mkdir(parents=True, exist_ok=True)
+    if kind == "file":
+        place.write_text("my notes\n", "ascii")
+    elif kind == "folder":
+        place.mkdir()
+    else:
+        place.symlink_to(tmp_path / "nowhere")
+    before = sorted(tmp_path.rglob("*"))
+    for command in ("recordings", "diagnose"):
+        assert run("demo", command, "--out", str(tmp_path)) == 1
+        assert f"{place}: there is another file of this name" in capsys.readouterr().err
+    assert sorted(tmp_path.rglob("*")) == before
+
+
 def test_files_are_written_again_over_themselves(tmp_path: Path) -> None:
     first = write_demo_data(tmp_path)
-    first[0].write_text("changed")
     assert write_demo_data(tmp_path) == first
     assert first[0].read_bytes() == demo_files()["README.md"]
 

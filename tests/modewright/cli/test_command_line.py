@@ -35,6 +35,24 @@ def run(*arguments: str) -> int:
     return run_with_exit_code(lambda: app(list(arguments), standalone_mode=False))
 
 
+def test_a_working_folder_that_was_deleted_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    monkeypatch.chdir(gone)
+    gone.rmdir()
+    for line in (["check", "estimator"], ["demo", "recordings"], ["compare", "a.csv", "b.csv"]):
+        assert run(*line) == 1
+        assert "the current folder does not exist any more" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["", "nothing"])
+def test_an_unknown_pass_is_an_error_of_usage(name: str) -> None:
+    assert run("explain", "estimator", "--stop-after", name) == 2
+    assert run("explain", "estimator", "--pass", name) == 2
+
+
 def test_help_loads_no_heavy_module() -> None:
     code = "import sys; sys.argv = ['modewright', '--help']\n"
     code += "from modewright.cli.app import main\n"
