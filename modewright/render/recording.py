@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
@@ -15,6 +16,7 @@ from diagnosis.data_quality.excitation import Excitation
 from diagnosis.data_quality.finding import format_findings
 from diagnosis.data_quality.recording_check import RecordingCheck
 from engine.recordings.recording_file import Assumption
+from language.text.sanitise import escape_invisible
 from modewright.render.run import nonfinite_to_none
 from modewright.runtime.json_format import format_entry
 
@@ -28,7 +30,13 @@ def print_check(screen: Console, check: RecordingCheck) -> None:
     """Print the channels, the assumptions, the excitation, the testable effects and the findings.
 
     Effects that cannot be tested are listed with what they need. Without findings a line says so.
+    A quiet console gives errors only, on stderr.
     """
+    if screen.quiet:
+        for severity, line in format_findings(check.findings):
+            if severity == "error":
+                print(f"error: {escape_invisible(line)}", file=sys.stderr)
+        return
     screen.print(channel_table(check.channels))
     if check.assumptions:
         screen.print()
@@ -50,6 +58,8 @@ def channel_table(channels: Sequence[ChannelCheck]) -> Table:
     heads = ("recording", "channel", "signal", "unit", "rate", "jitter", "missing", "step", "noise")
     table = Table(*heads, "from", "to", box=None, pad_edge=False, header_style="bold")
     for channel in channels[:MAX_CHANNELS]:
+        scale = abs(channel.factor)
+        low, high = sorted((channel.low / channel.factor, channel.high / channel.factor))
         table.add_row(
             escape(channel.recording),
             escape(channel.name),
@@ -58,10 +68,10 @@ def channel_table(channels: Sequence[ChannelCheck]) -> Table:
             f"{channel.rate:.4g} Hz",
             f"{1e3 * channel.jitter:.2g} ms",
             f"{channel.dropped:.1%}",
-            f"{channel.quantum / channel.factor:.3g}" if channel.quantum else "-",
-            f"{channel.noise / channel.factor:.2g}",
-            f"{channel.low / channel.factor:.4g}",
-            f"{channel.high / channel.factor:.4g}",
+            f"{channel.quantum / scale:.3g}" if channel.quantum else "-",
+            f"{channel.noise / scale:.2g}",
+            f"{low:.4g}",
+            f"{high:.4g}",
         )
     if len(channels) > MAX_CHANNELS:
         table.add_row("...", f"{len(channels) - MAX_CHANNELS} more")

@@ -348,3 +348,16 @@ def test_a_name_of_a_file_stays_on_its_line(
     text = capsys.readouterr().out
     assert ascii(name)[1:-1].replace("\\n", "\\x0a").replace("\\t", "\\x09") in text
     assert name not in text
+
+
+def test_a_quiet_check_prints_errors_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "one.csv").write_text("t_s,speed\n0,1\n", "ascii")
+    line = partial(app, ["--quiet", "recording", "check", "one.csv"], standalone_mode=False)
+    assert run_with_exit_code(line) == 1
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    errors = printed.err.splitlines()
+    assert errors and all(error.startswith("error: ") for error in errors)
