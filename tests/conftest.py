@@ -15,7 +15,7 @@ import typer
 from hypothesis import settings
 
 from language.loading import load
-from language.lowering import connection_program, sensor_program
+from language.programs import connection_program, sensor_program
 from modewright.runtime.gc_threshold import raise_gc_threshold
 from tests.support.memoised_specs import memoise_lowering, memoise_shipped
 from tests.support.valid_lowering import require_valid_result

@@ -10,7 +10,7 @@ from codegen.emit.c_names import CNames
 from language.ir.number_type import NumberType
 from language.ir.ops import Assign
 from language.ir.program import Program, unqualified_name
-from language.lowering.sensor_program import LAST_INPUT, LAST_OUTPUT, sensor_program
+from language.programs.sensor_program import LAST_INPUT, LAST_OUTPUT, sensor_program
 from language.programs.system_program import SimulationAssembly, output_variables
 
 INSTANCE_NAME = "i_{}"

@@ -73,6 +73,14 @@ def sampled_energy(base: Estimate, floor: Reals, correlation: float) -> float:
     return float(np.sum(base.prediction.counts * excess)) / correlation
 
 
+def negligible_gain(samples: float) -> float:
+    """Return the gain [nats] of a model that explains a negligible energy in independent samples.
+
+    `samples` is their number over all channels.
+    """
+    return NEGLIGIBLE_ENERGY * samples / 2.0
+
+
 def least_share(energy: float = math.inf, parameters: int = 1) -> float:
     """Return the explained share from which an effect is more probable than an unknown disturbance.
 

@@ -15,11 +15,11 @@ import numpy as np
 
 from diagnosis.criterion.effective_sample_size import integrated_autocorrelation
 from diagnosis.criterion.explained_share import (
-    NEGLIGIBLE_ENERGY,
     explained_share,
     is_ordinary,
     least_share,
     least_variances,
+    negligible_gain,
     remaining_energy,
     sampled_energy,
 )
@@ -66,8 +66,7 @@ class Round:
     @property
     def negligible_gain(self) -> float:
         """Gain [nats] of a model that explains a negligible energy."""
-        samples = float(np.sum(self.base.prediction.counts)) / self.correlation
-        return NEGLIGIBLE_ENERGY * samples / 2.0
+        return negligible_gain(float(np.sum(self.base.prediction.counts)) / self.correlation)
 
     def least_share_of(self, candidate: CandidateFit) -> float:
         """Return the share that an effect must explain to be as probable as what is unknown.

@@ -9,14 +9,14 @@ from engine.results.row_recorder import recorded_columns
 from language.ir.ops import Block
 from language.ir.program import Program
 from language.ir.traversal import block_reads
-from language.lowering.connection_program import (
+from language.model.declaration import Formula
+from language.model.system import Connection, Scenario, System
+from language.programs.connection_program import (
     connection_block,
     piece_block,
     wire_formulas,
     wires_program,
 )
-from language.model.declaration import Formula
-from language.model.system import Connection, Scenario, System
 from language.programs.system_program import (
     InputSource,
     InputTrajectory,

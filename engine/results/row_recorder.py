@@ -16,9 +16,9 @@ from engine.results.sampled_run import SignalArray as Column
 from engine.results.trajectory import column_array
 from language.expressions.units import display_unit
 from language.ir.program import Program, ValueType
-from language.lowering.connection_program import output_block
 from language.model.declaration import Formula
 from language.model.system import Scenario, System
+from language.programs.connection_program import output_block
 
 RowValues = tuple[Any, ...]
 """Values of one row, in the order of the recorded columns."""

@@ -11,7 +11,8 @@ import numpy as np
 
 from engine.interpreter.interpreter import Interpreter
 from language.lowering.program_builder import FORMULA_RESULT
-from language.lowering.sensor_program import (
+from language.model.system import Sensor
+from language.programs.sensor_program import (
     ELAPSED,
     INPUT,
     LAST_INPUT,
@@ -20,14 +21,13 @@ from language.lowering.sensor_program import (
     TIME_CONSTANT,
     sensor_program,
 )
-from language.model.system import Sensor
 
 NOISE_CHUNK = 1024
 """Number of noise values drawn at once; the stream does not depend on it."""
 
 
 class FirstOrderLag:
-    """State of the filter of a sensor, a first-order lag (language/lowering/sensor_program.py)."""
+    """State of the filter of a sensor, a first-order lag (language/programs/sensor_program.py)."""
 
     def __init__(self, lag: Fraction) -> None:
         """Take the time constant [s]; 0 means no lag."""

@@ -12,14 +12,14 @@ from engine.simulation.sensors import SensorRun
 from engine.simulation.stimuli import InputSignal
 from language.expressions.syntax_tree import names
 from language.ir.program import Program
-from language.lowering.connection_program import (
+from language.lowering.program_builder import FORMULA_RESULT
+from language.model.declaration import Formula
+from language.model.system import Connection, DelayedSignal, Scenario, System
+from language.programs.connection_program import (
     connection_block,
     wire_formulas,
     wires_program,
 )
-from language.lowering.program_builder import FORMULA_RESULT
-from language.model.declaration import Formula
-from language.model.system import Connection, DelayedSignal, Scenario, System
 
 ReadSignal = Callable[[str], Any]
 """Function that returns the value of a signal by its name."""

@@ -10,8 +10,8 @@ from fractions import Fraction
 
 from engine.recordings.recording import Channel, Recording, read_recording
 from language.loading.stimulus_reader import constant_pieces, linear_pieces
-from language.lowering.connection_program import piece_block
 from language.model.system import Scenario, Stimulus, StimulusPiece
+from language.programs.connection_program import piece_block
 from language.text.diagnostic import AssumptionWarning, Problem, SpecError
 
 EvaluateFormula = Callable[[str, float], float]

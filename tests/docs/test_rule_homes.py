@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from language.lowering.sensor_program import sensor_program
+from language.programs.sensor_program import sensor_program
 from tests.docs.test_rule_citations import ROOT, SEMANTICS, leaf_rules
 
 LOWERING = (
@@ -130,7 +130,7 @@ def test_the_numerics_of_sensors_are_in_no_driver() -> None:
     assert not re.search(r"\b(ha_exp|exp|floor)\(", driver)
     engine = ast.parse((ROOT / "engine/simulation/sensors.py").read_text("utf-8"))
     names = {node.module for node in ast.walk(engine) if isinstance(node, ast.ImportFrom)}
-    assert "language.lowering.sensor_program" in names
+    assert "language.programs.sensor_program" in names
     assert "language.numerics.evaluate" not in names
     assert not any(
         alias.name == "math"

@@ -144,27 +144,30 @@ class TestSignalsWithoutAValue:
     """cantools fails at a frame, or needs minutes to load such a file."""
 
     @pytest.mark.parametrize(
-        "place", ["-1|8@1+", "-16|16@1-", "99999999|8@1+", "0|999999999@1+", "7|80000@0+"]
+        ("statement", "told"),
+        [
+            (
+                f' SG_ x : {place} (1,0) [0|0] "" ECU',
+                "(`SG_ x :`) has bits outside of a message of 4095 bytes",
+            )
+            for place in ("-1|8@1+", "-16|16@1-", "99999999|8@1+", "0|999999999@1+", "7|80000@0+")
+        ]
+        + [
+            (
+                f'BO_ 1000 x: {length} ECU\n SG_ y : 0|8@1+ (1,0) [0|0] "" ECU',
+                f"(`BO_ 1000 x:`) has {length} bytes; a message has 0 to 4095",
+            )
+            for length in (-8, -1, 4096, 99999999, 10**40)
+        ],
     )
-    def test_bits_outside_of_a_message_are_left_out_and_told(
-        self, tmp_path: Path, place: str
+    def test_bits_and_lengths_outside_of_a_message_are_left_out_and_told(
+        self, tmp_path: Path, statement: str, told: str
     ) -> None:
-        dbc = MOTOR + f' SG_ x : {place} (1,0) [0|0] "" ECU\n'
+        dbc = f"{MOTOR}{statement}\n"
         found = read(write(tmp_path, "a.log", motor_lines(), dbc), MAP)
         assert values_of(found) == TORQUES
         (note,) = notes_of(found)
-        assert "line 8 (`SG_ x :`) has bits outside of a message of 4095 bytes" in note
-
-    @pytest.mark.parametrize("length", [-8, -1, 4096, 99999999, 10**40])
-    def test_a_message_of_an_impossible_length_is_left_out_and_told(
-        self, tmp_path: Path, length: int
-    ) -> None:
-        dbc = MOTOR + f'BO_ 1000 Far: {length} ECU\n SG_ x : 0|8@1+ (1,0) [0|0] "" ECU\n'
-        found = read(write(tmp_path, "a.log", motor_lines(), dbc), MAP)
-        assert values_of(found) == TORQUES
-        (note,) = notes_of(found)
-        assert "line 8 (`BO_ 1000 Far:`) has" in note
-        assert "bytes; a message has 0 to 4095" in note
+        assert f"line 8 {told}" in note
 
     @pytest.mark.parametrize("place", ["0|8@11e3-", "0|8@2+", "0|8@1", "0|8@"])
     def test_a_signal_without_its_byte_order_is_left_out(self, tmp_path: Path, place: str) -> None:

@@ -86,7 +86,7 @@ def _negligible_gain(decision: Mapping[str, Any]) -> float:
     """
     energy, sampled = decision["energy"], decision["sampled_energy"]
     samples = sampled * decision["channels"] / energy if energy and sampled else 0.0
-    return float(explained_share.NEGLIGIBLE_ENERGY * samples / 2.0)
+    return explained_share.negligible_gain(samples)
 
 
 def log_score(answer: Answer) -> float:
